@@ -59,6 +59,23 @@ int32_t* keyframe_numbers(Odometry* odometry) {
   return arena_alloc<int32_t>(odometry->scratch, static_cast<size_t>(odometry->map.num_keyframes));
 }
 
+// An empty window around a keyframe, and two numbers for each keyframe of the map: how many points
+// it shares with that one, and the keyframes that are adjusted, in ascending order.
+struct Around {
+  MapWindow window;
+  int32_t *shared, *chosen;
+  int32_t num_adjusted;
+};
+
+Around look_around(Odometry* odometry, int32_t keyframe) {
+  Around around;
+  around.window = make_map_window(*odometry, sizes_of(odometry->options), odometry->scratch);
+  around.shared = keyframe_numbers(odometry);
+  around.chosen = keyframe_numbers(odometry);
+  around.num_adjusted = choose_adjusted(odometry, keyframe, around.shared, around.chosen);
+  return around;
+}
+
 }  // namespace
 
 size_t adjust_bytes(const tv_odometry_options& o) {
@@ -97,13 +114,12 @@ bool estimate_covariance(Odometry* odometry, int32_t keyframe, double covariance
   Arena& arena = odometry->scratch;
   ArenaScope scope(arena);
   const Map& map = odometry->map;
-  const WindowSizes sizes = sizes_of(odometry->options);
-  MapWindow window = make_map_window(*odometry, sizes, arena);
-  int32_t *shared = keyframe_numbers(odometry), *chosen = keyframe_numbers(odometry);
-  const int32_t num_adjusted = choose_adjusted(odometry, keyframe, shared, chosen);
+  Around around = look_around(odometry, keyframe);
+  MapWindow& window = around.window;
+  const int32_t* chosen = around.chosen;
   bool holds_before = false;
   int32_t view = -1;
-  for (int32_t k = 0; k < num_adjusted; ++k) {
+  for (int32_t k = 0; k < around.num_adjusted; ++k) {
     holds_before = holds_before || chosen[k] == keyframe - 1;
     if (chosen[k] == keyframe) view = k;
     add_view(map, chosen[k], chosen[k] == keyframe - 1, &window);
@@ -111,7 +127,7 @@ bool estimate_covariance(Odometry* odometry, int32_t keyframe, double covariance
   if (!holds_before) return false;
   add_points(map, &window);
   add_observations(*odometry, &window);
-  window.covariances = arena_alloc<double>(arena, 36 * static_cast<size_t>(sizes.views));
+  window.covariances = arena_alloc<double>(arena, 36 * static_cast<size_t>(window.sizes.views));
   window.max_iterations = 1;
   if (!adjust_map_window(*odometry, &window, arena)) return false;
   std::copy_n(window.covariances + 36 * view, 36, covariance);
@@ -130,13 +146,13 @@ bool estimate_covariance(Odometry* odometry, int32_t keyframe, double covariance
 void adjust_around(Odometry* odometry, int32_t keyframe, int32_t max_iterations) {
   ArenaScope scope(odometry->scratch);
   Map& map = odometry->map;
-  MapWindow window = make_map_window(*odometry, sizes_of(odometry->options), odometry->scratch);
-  int32_t *shared = keyframe_numbers(odometry), *chosen = keyframe_numbers(odometry);
-  const int32_t num_adjusted = choose_adjusted(odometry, keyframe, shared, chosen);
+  Around around = look_around(odometry, keyframe);
+  MapWindow& window = around.window;
+  int32_t *shared = around.shared, *chosen = around.chosen;
   const int32_t segment = map.keyframes[keyframe].segment;
   int32_t first = 0;
   while (map.keyframes[first].segment != segment) ++first;
-  for (int32_t k = 0; k < num_adjusted; ++k) {
+  for (int32_t k = 0; k < around.num_adjusted; ++k) {
     add_view(map, chosen[k], chosen[k] == first, &window);
     shared[chosen[k]] = -1;
   }
