@@ -9,10 +9,6 @@
 #include "base/arena.h"
 #include "kernels/kernels.h"
 
-// Put before a loop of three turns, which is then straight code even where the compiler would leave
-// it.
-#define TV_UNROLL _Pragma("GCC unroll 3")
-
 namespace tv {
 
 // Two doubles, of which each operation is the same IEEE operation on each: every CPU of the library

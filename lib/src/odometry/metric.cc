@@ -83,8 +83,9 @@ void add_way(Odometry* odometry, int32_t keyframe, double sign) {
                  TV_SCALE_VELOCITY, &odometry->scale);
   }
   if (odometry->is_upright && own.height_sigma_m > 0 && before.height_sigma_m > 0) {
-    const double* R = own.cam_from_world.R;
-    const double climb = R[2] * back[0] + R[5] * back[1] + R[8] * back[2];
+    double in_world[3];
+    rotate_back(own.cam_from_world.R, back, in_world);
+    const double climb = in_world[2];
     add_evidence(
         sign * (own.height_m - before.height_m) * climb, sign * climb * climb,
         own.height_sigma_m * own.height_sigma_m + before.height_sigma_m * before.height_sigma_m,
@@ -131,9 +132,10 @@ void read_sensors(const tv_odometry_frame& input, Frame* frame) {
 bool check_attitude(const Odometry& odometry, Frame* frame) {
   Sensors* s = &frame->sensors;
   if (!odometry.is_upright || s->attitude_sigma_rad == 0) return true;
-  // Between down in the camera's frame by the map and by the attitude.
-  const double *R = frame->cam_from_world.R, *down = s->world_from_cam + 6;
-  const double tilt = acos(R[2] * down[0] + R[5] * down[1] + R[8] * down[2]);
+  // Between down by the map and by the attitude.
+  double down[3];
+  rotate_back(frame->cam_from_world.R, s->world_from_cam + 6, down);
+  const double tilt = acos(down[2]);
   if (tilt <= kLargestTilt + 3 * s->attitude_sigma_rad) return true;
   s->attitude_sigma_rad = 0;
   return false;
@@ -159,10 +161,9 @@ void add_travel(Odometry* odometry, const Frame& frame) {
   const Sensors& s = frame.sensors;
   Travel* travel = &odometry->travel;
   travel->is_known = travel->is_known && s.velocity_sigma_m_s > 0;
-  const double *R = frame.cam_from_world.R, *v = s.velocity_m_s;
-  for (int c = 0; c < 3; ++c) {
-    travel->way_m[c] += seconds * (R[c] * v[0] + R[3 + c] * v[1] + R[6 + c] * v[2]);
-  }
+  double in_world[3];
+  rotate_back(frame.cam_from_world.R, s.velocity_m_s, in_world);
+  for (int c = 0; c < 3; ++c) travel->way_m[c] += seconds * in_world[c];
   const double sigma = seconds * s.velocity_sigma_m_s;
   travel->variance += sigma * sigma;
   travel->bound_m += sigma;

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "geometry/camera.h"
+#include "geometry/vector3.h"
 #include "odometry/block_cholesky.h"
 #include "twoview/window.h"
 

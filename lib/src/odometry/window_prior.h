@@ -4,7 +4,7 @@
 // test/unit/test_window.cc.
 #pragma once
 
-#include "geometry/camera.h"
+#include "geometry/vector3.h"
 #include "odometry/block_cholesky.h"
 #include "twoview/window.h"
 
@@ -22,12 +22,6 @@ inline void to_camera(const WindowPose& pose, const double X[3], double x[3]) {
     const double* row = pose.R + 3 * i;
     x[i] = ((row[0] * X[0] + row[1] * X[1]) + row[2] * X[2]) + pose.t[i];
   }
-}
-
-// R'v
-inline void rotate_back(const double R[9], const double v[3], double out[3]) {
-  TV_UNROLL
-  for (int i = 0; i < 3; ++i) out[i] = (R[i] * v[0] + R[3 + i] * v[1]) + R[6 + i] * v[2];
 }
 
 inline void set_centre(WindowPose* pose) {
