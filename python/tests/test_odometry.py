@@ -54,6 +54,13 @@ def test_the_path_is_the_flown_one(flight):
         assert np.abs(R - np.eye(3)).max() < 0.02
 
 
+def test_the_camera_is_as_given_where_nothing_contradicts_it(flight):
+    odometry, states = flight
+    assert odometry.camera == CAMERA and not states[-1].principal_point_shift_px.any()
+    with tv.Odometry(CAMERA, correct_camera=False) as kept:
+        assert kept.camera == CAMERA
+
+
 def test_the_map_is_consistent(flight):
     odometry, states = flight
     points = odometry.points()

@@ -224,7 +224,7 @@ class tv_window_result(Structure):
 class tv_odometry_options(Structure):
     _fields_ = [("struct_size", c_uint32), ("max_keypoints", c_int32), ("max_keyframes", c_int32),
                 ("max_points", c_int32), ("window", c_int32), ("kernels", c_int32),
-                ("seed", c_uint64)]
+                ("seed", c_uint64), ("correct_camera", c_int32), ("reserved", c_int32)]
 
 
 class tv_odometry_frame(Structure):
@@ -247,7 +247,8 @@ class tv_odometry_state(Structure):
                 ("reference_from_cam_R", c_double * 9), ("reference_from_cam_t", c_double * 3),
                 ("world_from_cam_R", c_double * 9), ("world_from_cam_t", c_double * 3),
                 ("covariance", c_double * 36), ("noise_px", c_double), ("scale_source", c_int32),
-                ("reserved2", c_int32), ("scale_sigma", c_double)]
+                ("reserved2", c_int32), ("scale_sigma", c_double),
+                ("principal_point_shift_px", c_double * 2)]
 
 
 class tv_keyframe(Structure):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from ctypes import byref, c_int32, c_size_t, c_void_p
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Optional
 
 import numpy as np
@@ -44,6 +44,7 @@ class OdometryState:
     noise_px: float  #: of a pixel of sigma 1, one standard deviation
     scale_source: ScaleSource  #: where the unit of lengths comes from
     scale_sigma: Optional[float]  #: relative; None where the unit is not the metre
+    principal_point_shift_px: np.ndarray  #: (2,), from where the camera has it; zeros: not moved
 
 
 @dataclass(frozen=True)
@@ -83,7 +84,7 @@ class Odometry:
         self._pointer = c_void_p()
         self.library.call("tv_odometry_init", byref(self._pointer), byref(struct), byref(wanted),
                           c_void_p(self._memory.ctypes.data + start), size)
-        self.camera, self.size_bytes = camera, size.value
+        self._given_camera, self.size_bytes = camera, size.value
         self.max_keypoints, self.max_points = int(wanted.max_keypoints), int(wanted.max_points)
         self._lock = threading.RLock()
 
@@ -130,6 +131,14 @@ class Odometry:
         state = self.library.make(_abi.tv_odometry_state)
         self._call("tv_odometry_track", byref(frame), byref(state))
         return _state(state)
+
+    @property
+    def camera(self) -> Camera:
+        """tv_odometry_camera: the camera as it is used now: the one that was given, with another
+        principal point where it was moved."""
+        struct = _abi.tv_camera()
+        self._call("tv_odometry_camera", byref(struct))
+        return replace(self._given_camera, cx=struct.cx, cy=struct.cy)
 
     def finish(self) -> None:
         """tv_odometry_finish: does what tracking left for the frames to come. To be called after
@@ -228,4 +237,5 @@ def _state(s: Any) -> OdometryState:
         _matrix(s.world_from_cam_R, 3, 3) if posed else None,
         _matrix(s.world_from_cam_t, 3) if posed else None,
         _matrix(s.covariance, 6, 6) if s.has_covariance else None, s.noise_px, scale,
-        s.scale_sigma if scale != ScaleSource.UNIT else None)
+        s.scale_sigma if scale != ScaleSource.UNIT else None,
+        _matrix(s.principal_point_shift_px, 2))

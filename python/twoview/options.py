@@ -133,6 +133,8 @@ class OdometryOptions:
     window: int = 10  #: keyframes that are adjusted together, [3, 20]
     kernels: int = Kernels.AUTO
     seed: Optional[int] = None  #: seed of every sampler; None: the library's constant
+    correct_camera: bool = True  #: move the principal point where many keyframes agree
+    reserved: int = 0  #: must be 0
 
 
 @dataclass(frozen=True)

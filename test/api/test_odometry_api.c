@@ -17,7 +17,7 @@ enum {
   MEMORY = 6 << 20,
   MAP = 1 << 18,
   /* The sizes of the records of the map's bytes, and where the first point begins. */
-  HEADER = 208,
+  HEADER = 224,
   POINT = 192,
   KEYFRAME = 176,
   KEYPOINT = 16,
@@ -95,6 +95,7 @@ static void test_init_functions_write_defaults_and_sizes(void) {
   TEST_ASSERT_EQUAL_INT(20000, options.max_points);
   TEST_ASSERT_EQUAL_INT(10, options.window);
   TEST_ASSERT_EQUAL_INT(TV_KERNELS_AUTO, options.kernels);
+  TEST_ASSERT_EQUAL_INT(1, options.correct_camera);
   memset(&frame, 1, sizeof frame);
   tv_odometry_frame_init(&frame);
   TEST_ASSERT_EQUAL_UINT32(sizeof frame, frame.struct_size);
@@ -134,12 +135,14 @@ static void expect_size(tv_status expected) {
 
 static void test_size_refuses_bad_cameras_and_options(void) {
   const tv_odometry_options good = options;
-  static const int32_t ranges[5][2] = {
-      {100, 4096}, {8, 2000}, {500, 200000}, {3, 20}, {TV_KERNELS_AUTO, TV_KERNELS_NEON}};
+  static const int32_t ranges[7][2] = {
+      {100, 4096}, {8, 2000}, {500, 200000}, {3, 20}, {TV_KERNELS_AUTO, TV_KERNELS_NEON},
+      {0, 1},      {0, 0}};
   int k;
-  for (k = 0; k < 5; ++k) {
-    int32_t *const fields[5] = {&options.max_keypoints, &options.max_keyframes, &options.max_points,
-                                &options.window, &options.kernels};
+  for (k = 0; k < 7; ++k) {
+    int32_t *const fields[7] = {
+        &options.max_keypoints, &options.max_keyframes,  &options.max_points, &options.window,
+        &options.kernels,       &options.correct_camera, &options.reserved};
     *fields[k] = ranges[k][0] - 1, expect_size(TV_ERR_ARGUMENT);
     *fields[k] = ranges[k][1] + 1, expect_size(TV_ERR_ARGUMENT);
     options = good;
@@ -743,6 +746,14 @@ static void test_frames_go_on_as_if_none_had_been_located(void) {
 
 static uint64_t count_calls(void *user) { return ++*(uint64_t *)user; }
 
+static void test_the_camera_is_reported(void) {
+  tv_camera used;
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_camera(odometry, &used));
+  TEST_ASSERT_EQUAL_MEMORY(&camera, &used, sizeof used);
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_camera(NULL, &used));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_camera(odometry, NULL));
+}
+
 static void test_the_clock_is_read(void) {
   uint64_t calls = 0, before, times[TV_NUM_STAGES];
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_set_clock(NULL, count_calls, &calls));
@@ -796,7 +807,7 @@ static void test_the_bytes_are_as_documented(void) {
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_save_size(odometry, &size));
   TEST_ASSERT_EQUAL_UINT64(size, num_map);
   TEST_ASSERT_EQUAL_MEMORY("TVMAP\r\n\x1a", map, 8);
-  TEST_ASSERT_EQUAL_UINT64(1, number_at(map + 8, 4));
+  TEST_ASSERT_EQUAL_UINT64(2, number_at(map + 8, 4));
   TEST_ASSERT_EQUAL_UINT64(crc_of(map + 16, num_map - 16), number_at(map + 12, 4));
   TEST_ASSERT_EQUAL_UINT64(num_map, number_at(map + 16, 8));
   TEST_ASSERT_EQUAL_UINT64(ROOM_WIDTH, number_at(map + 28, 4));
@@ -804,6 +815,7 @@ static void test_the_bytes_are_as_documented(void) {
   TEST_ASSERT_EQUAL_UINT64(state.num_points, number_at(map + 136, 4));
   TEST_ASSERT_EQUAL_UINT64(state.num_keyframes, number_at(map + 140, 4));
   TEST_ASSERT_EQUAL_UINT64(state.num_frames, number_at(map + 156, 4));
+  TEST_ASSERT_TRUE(double_at(map + 208) == camera.cx && double_at(map + 216) == camera.cy);
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_points(odometry, points, POINTS, &num));
   for (k = 0; k < num; ++k, p += POINT) {
     TEST_ASSERT_EQUAL_UINT64(points[k].id, number_at(p + 24, 4));
@@ -1118,7 +1130,7 @@ static void test_a_map_of_wrong_content_is_refused(void) {
   keyframe = HEADER + POINT * number_at(map + 136, 4);
   keypoint = keyframe + KEYFRAME;
   expect_sealed(TV_OK, num_map);
-  put(8, 2, 4), expect_sealed(TV_ERR_MAP, num_map);    /* the version */
+  put(8, 1, 4), expect_sealed(TV_ERR_MAP, num_map);    /* the version */
   put(36, 1, 4), expect_sealed(TV_ERR_MAP, num_map);   /* the camera's reserved field */
   put(40, nan, 8), expect_sealed(TV_ERR_MAP, num_map); /* fx */
   put(172, 2, 4), expect_sealed(TV_ERR_MAP, num_map);  /* upright or not */
@@ -1128,6 +1140,8 @@ static void test_a_map_of_wrong_content_is_refused(void) {
   put(176, 4, 4), expect_sealed(TV_ERR_MAP, num_map); /* the scale */
   put(184, 0x3ff0000000000000u, 8), put(192, 0, 8), expect_sealed(TV_ERR_MAP, num_map);
   put(192, nan, 8), expect_sealed(TV_ERR_MAP, num_map);
+  put(208, nan, 8), expect_sealed(TV_ERR_MAP, num_map); /* the principal point */
+  put(216, huge, 8), expect_sealed(TV_ERR_MAP, num_map);
   for (k = 136; k < 148; k += 4) { /* one more or one less than there are */
     put(k, number_at(map + k, 4) + 1, 4), expect_sealed(TV_ERR_MAP, num_map);
     put(k, number_at(map + k, 4) - 1, 4), expect_sealed(TV_ERR_MAP, num_map);
@@ -1219,6 +1233,7 @@ int main(void) {
   RUN_TEST(test_poses_are_found_again_from_their_keyframes);
   RUN_TEST(test_a_frame_is_located_without_changing_the_map);
   RUN_TEST(test_frames_go_on_as_if_none_had_been_located);
+  RUN_TEST(test_the_camera_is_reported);
   RUN_TEST(test_the_clock_is_read);
   RUN_TEST(test_the_bytes_are_as_documented);
   RUN_TEST(test_a_loaded_map_is_the_same_and_is_found_again);

@@ -151,6 +151,34 @@ class OdometryTest(CliTest):
         self.assertEqual(len({tuple(path[t][:3]) for t in times}), len(times))
         self.assertLess(self.result()["truth"]["ate_rmse"], 0.03)
 
+    def test_a_principal_point_that_keyframes_contradict_is_moved(self):
+        sequence = DATA / "seq_kitti00_first200"
+        if not sequence.is_dir():
+            self.skipTest(f"no {sequence}")
+        given, first = 607.1928, ("--max-frames", "125")
+        done = self.succeed(self.odometry(sequence, *first, timeout=120))
+        self.assertIn("many keyframes agree that its principal point is off", done.stdout.decode())
+        x, y = self.result()["principal_point_shift_px"]
+        # kitti00_turn's pairs ask for (-10, 2) px: docs/algorithms/principal_point.md.
+        self.assertTrue(-13 < x < -7 and -2 < y < 6, f"{x}, {y}")
+        camera = self.out / "corrected_camera.yaml"
+        matrix = re.search(r"data: \[ ([^]]*) \]", camera.read_text())[1].split(",")
+        self.assertAlmostEqual(float(matrix[2]), given + x, 9)
+        info = self.succeed(self.run_program("map", "info", self.out / "map.twm", "--json"))
+        self.assertAlmostEqual(json.loads(info.stdout)["camera"]["cx"], given + x, 9)
+        colmap = (self.out / "colmap/cameras.txt").read_text().split()
+        self.assertAlmostEqual(float(colmap[-2]), given + x + 0.5, 9)
+        # With that camera nothing is left to move, and the file is not written over.
+        text = camera.read_bytes()
+        self.succeed(self.odometry(sequence, *first, "--camera", camera, timeout=120))
+        self.assertIsNone(self.result()["principal_point_shift_px"])
+        self.assertEqual(camera.read_bytes(), text)
+        done = self.succeed(self.odometry(sequence, *first, "--keep-camera", timeout=120))
+        self.assertNotIn("principal point", done.stdout.decode())
+        self.assertIsNone(self.result()["principal_point_shift_px"])
+        self.assertTrue(self.result()["options"]["keep_camera"])
+        self.assertFalse(camera.exists(), "that of an earlier run is removed")
+
     def test_the_cloud_has_the_walls(self):
         self.succeed(self.odometry(self.set_folder()))
         data = (self.out / "cloud.ply").read_bytes()

@@ -84,7 +84,7 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     // Most numbers begin at a multiple of 4; the header and the first keyframe are met more often.
     size_t at = given.raw<uint32_t>();
     const int where = given.whole(0, 3);
-    if (where == 0) at %= 208;
+    if (where == 0) at %= 224;
     at = at % bytes.size() / 4 * 4 + (where == 1 ? at % 4 : 0);
     const int width = given.whole(0, 2) == 0 ? 8 : given.whole(1, 4);
     const uint64_t number = given.raw<uint64_t>();

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "odometry/loop.h"
+#include "odometry/adjust_segment.h"
 
 namespace tv {
 namespace {
@@ -75,7 +75,6 @@ void correct_camera(Odometry* odometry, Frame* frame) {
   if ((e->next_num == 0 && !(gain >= least * scatter)) || !(way <= kFarthest * now.fx)) return;
   e->next_num = 2 * e->num_pairs;
   e->product[0] = e->product[1] = 0;
-  e->square -= gain;
   const Rigid turn = move_principal_point(odometry, to, from, 0);
   frame->cam_from_world = compose(turn, frame->cam_from_world);
   odometry->weak_loop.frame = -1;

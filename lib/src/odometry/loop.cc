@@ -42,7 +42,7 @@ constexpr double kLeastScale = 0.6875, kLargestScale = 1.5;
 constexpr int32_t kJoinSteps = 20;  // of the adjustment where two maps meet
 // After a loop: steps of the adjustment of many keyframes, one at each frame, and of the points. At
 // least so many of the newest keyframes are adjusted, and all since the loop before.
-constexpr int32_t kSpreadSteps = 12, kPointSteps = 3, kLeastSpread = 100;
+constexpr int32_t kPointSteps = 3, kLeastSpread = 100;
 // Smaller corrections are not spread: median depths, radians.
 constexpr double kLeastWay = 0.005, kLeastTurn = 0.005;
 constexpr double kMatchRatio = 0.87;
@@ -312,11 +312,6 @@ bool close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const 
   const int32_t first_id = map.keyframes[std::max(newest + 1 - kLeastSpread, 0)].id;
   begin_spread(odometry, old_segment, again_here ? std::min(before.last_id, first_id) : 0);
   return segment == old_segment && is_jump(odometry, now, keyframe);
-}
-
-void begin_spread(Odometry* odometry, int32_t segment, int32_t first_id) {
-  const Map& map = odometry->map;
-  odometry->spread = {kSpreadSteps, 0, segment, first_id, map.keyframes[map.num_keyframes - 1].id};
 }
 
 bool is_spreading(const Odometry& odometry) {

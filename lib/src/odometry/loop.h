@@ -45,10 +45,6 @@ bool find_loop(Odometry* odometry, const Frame& frame, int32_t count, Frame* aga
 // Returns whether the path jumps.
 bool close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const LoopEnd& end);
 
-// Begins the adjustment of a segment from the keyframe of this id on, as after a loop. The map has
-// keyframes.
-void begin_spread(Odometry* odometry, int32_t segment, int32_t first_id);
-
 // Whether a closed loop is still to be spread over the keyframes of its segment.
 bool is_spreading(const Odometry& odometry);
 

@@ -74,7 +74,7 @@ struct Header {
   int32_t num_frames, num_segments, num_relocations, num_loops;
   int32_t is_upright;
   MetricScale scale;
-  double principal_point[2];  // since version 2: as it was moved; the camera is the given one
+  double principal_point[2];  // as it was moved: the camera is the one that was given
 };
 
 // Numbers of one type that follow each other in their struct.
@@ -101,7 +101,7 @@ constexpr Numbers kOfHeader[] = {
     TV_NUMBERS(Header, camera.model, camera.reserved),
     TV_NUMBERS(Header, camera.fx, camera.k),
     TV_NUMBERS(Header, num_points, scale.evidence),
-    TV_NUMBERS(Header, scale.product, scale.sigma),
+    TV_NUMBERS(Header, scale.product, principal_point),
 };
 constexpr Numbers kOfPoint[] = {
     TV_NUMBERS(MapPoint, position, position),     TV_NUMBERS(MapPoint, id, segment),
@@ -129,16 +129,6 @@ void pass_all(Stream* s, void* of_struct, const Numbers* numbers, size_t num) {
 template <size_t n>
 void pass(Stream* s, void* of_struct, const Numbers (&numbers)[n]) {
   pass_all(s, of_struct, numbers, n);
-}
-
-void pass_header(Stream* s, Header* h) {
-  pass(s, h, kOfHeader);
-  if (h->version > 1) {
-    pass_numbers(s, h->principal_point, sizeof(double), sizeof h->principal_point);
-  } else {
-    h->principal_point[0] = h->camera.cx;
-    h->principal_point[1] = h->camera.cy;
-  }
 }
 
 void pass_point(Stream* s, MapPoint* point, uint8_t* descriptor) {
@@ -178,7 +168,8 @@ bool is_header(const Header& h) {
          is_index(h.scale.source, 4) && is_index(h.scale.evidence, 4) &&
          is_measure(h.scale.product, h.scale.square) &&
          (h.scale.square > 0 || h.scale.product == 0) && is_measure(0, h.scale.sigma) &&
-         is_measure(h.principal_point[0], 0) && is_measure(h.principal_point[1], 0) &&
+         std::fabs(h.principal_point[0] - h.camera.cx) < h.camera.fx &&
+         std::fabs(h.principal_point[1] - h.camera.cy) < h.camera.fx &&
          tv_camera_check(&h.camera) == TV_OK;
 }
 
@@ -325,7 +316,7 @@ size_t write_map(const Odometry& odometry, uint8_t* to) {
   else if (segment == odometry.other_segment)
     h.scale = odometry.other_scale;
   Stream s{to, nullptr, 0, 0, false};
-  pass_header(&s, &h);
+  pass(&s, &h, kOfHeader);
   for (int32_t n = 0; n < map.num_points; ++n) {
     MapPoint point = map.points[places[n]];
     uint8_t descriptor[TV_DESCRIPTOR_BYTES];
@@ -351,10 +342,10 @@ size_t write_map(const Odometry& odometry, uint8_t* to) {
   if (to != nullptr) {  // the header again, now that what it tells is known
     h.num_bytes = num_bytes;
     s.at = 0;
-    pass_header(&s, &h);
+    pass(&s, &h, kOfHeader);
     h.checksum = checksum(to + kUnchecked, num_bytes - kUnchecked);
     s.at = 0;
-    pass_header(&s, &h);
+    pass(&s, &h, kOfHeader);
   }
   return num_bytes;
 }
@@ -363,8 +354,8 @@ tv_status read_map(const uint8_t* bytes, size_t num_bytes, bool replaces, Odomet
   Map* map = &odometry->map;
   Header h;
   Stream s{nullptr, bytes, 0, num_bytes, false};
-  pass_header(&s, &h);
-  if (s.is_bad || std::memcmp(h.magic, kMagic, sizeof kMagic) != 0 || h.version - 1 >= kVersion ||
+  pass(&s, &h, kOfHeader);
+  if (s.is_bad || std::memcmp(h.magic, kMagic, sizeof kMagic) != 0 || h.version != kVersion ||
       h.num_bytes != num_bytes ||
       h.checksum != checksum(bytes + kUnchecked, num_bytes - kUnchecked) || !is_header(h)) {
     return TV_ERR_MAP;

@@ -58,7 +58,8 @@ struct WeakLoop {
   Rigid cam_from_world, end_from_world;
 };
 
-// What is left to do after a loop, a part at each frame that has no keyframe to adjust.
+// What is left to do after a loop or a correction of the camera, a part at each frame that has no
+// keyframe to adjust.
 struct Spread {
   int32_t num_steps;   // of the adjustment of many keyframes together
   int32_t next_place;  // then: of the points, from which on they are still to be adjusted

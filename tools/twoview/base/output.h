@@ -27,6 +27,9 @@ class OutputSet {
   // delete it.
   void keep(const std::string& input);
 
+  // Whether this name in the folder is a file that keep() protects.
+  bool is_input(const std::string& name) const { return is_kept(folder_ / name); }
+
   void add(const std::string& name, std::string_view bytes);
   void commit();
 

@@ -78,6 +78,14 @@ Flight::Flight(FrameSource& source, const FlightOptions& options)
 
 Flight::~Flight() = default;
 
+tv_camera Flight::corrected_file_camera() const {
+  tv_camera camera = file_camera_;
+  const double scale = static_cast<double>(file_camera_.width) / camera_.width;
+  camera.cx += scale * state_.principal_point_shift_px[0];
+  camera.cy += scale * state_.principal_point_shift_px[1];
+  return camera;
+}
+
 bool Flight::wants(int index) const {
   if (index % options_.every != 0) return false;
   return options_.max_frames == 0 || index / options_.every < options_.max_frames;
@@ -201,6 +209,7 @@ void Flight::track_frame(SourceFrame frame) {
 void Flight::finish(const std::atomic<bool>& stop) {
   if (odometry_ == nullptr) return;
   check(tv_odometry_finish(odometry_), "the map");
+  check(tv_odometry_camera(odometry_, &camera_), "the camera");
   for (FlightFrame& frame : frames_) {
     if (frame.reference_id < 0) continue;
     double R[9], t[3];

@@ -106,9 +106,15 @@ class Flight {
   // Whether attitudes were given, so that the map's z axis points down.
   bool is_upright() const { return is_upright_; }
   const tv_odometry_state& state() const { return state_; }
+  // With the principal point as the odometry has moved it.
   const tv_camera& camera() const { return camera_; }
   // The camera of the frames as the source gives them, before they are scaled down.
   const tv_camera& file_camera() const { return file_camera_; }
+  // The same, with the principal point as the odometry has moved it.
+  tv_camera corrected_file_camera() const;
+  bool has_corrected_camera() const {
+    return state_.principal_point_shift_px[0] != 0 || state_.principal_point_shift_px[1] != 0;
+  }
   size_t context_bytes() const { return context_bytes_; }
   int num_unreadable() const { return num_unreadable_; }
   const std::string& first_problem() const { return first_problem_; }

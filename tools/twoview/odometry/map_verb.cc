@@ -85,6 +85,7 @@ class LoadedMap {
     if (!memory_) throw BadInput("not enough memory for the map " + paths[0]);
     check(tv_odometry_init(&odometry_, &camera_, &options, memory_.get(), size), paths[0]);
     for (const MapFile& file : files) add(file);
+    check(tv_odometry_camera(odometry_, &camera_), paths[0]);
     int32_t count = 0;
     points_.resize(static_cast<size_t>(options.max_points));
     check(tv_odometry_points(odometry_, points_.data(), options.max_points, &count), paths[0]);

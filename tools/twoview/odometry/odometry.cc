@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "base/output.h"
 #include "base/terminal.h"
+#include "files/camera_file.h"
 #include "files/camera_formats.h"
 #include "odometry/flight.h"
 #include "odometry/live.h"
@@ -31,9 +32,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::vector<std::string> kFiles = {"trajectory.txt",  "live.txt",    "keyframes.txt",
-                                         "covariances.txt", "frames.csv",  "cloud.ply",
-                                         "map.twm",         "report.html", "result.json"};
+const char* const kCameraFile = "corrected_camera.yaml";
+const std::vector<std::string> kFiles = {
+    "trajectory.txt", "live.txt",  "keyframes.txt", kCameraFile,   "covariances.txt",
+    "frames.csv",     "cloud.ply", "map.twm",       "report.html", "result.json"};
 const std::vector<std::string> kColmapFiles = {"cameras.txt", "images.txt", "points3D.txt"};
 
 struct Arguments {
@@ -41,6 +43,7 @@ struct Arguments {
   std::string source, camera, truth;
   double fps = 0, duration = 0;
   bool ignores_imu = false;
+  bool keeps_camera = false;
   bool is_live = false;
   bool has_resize = false;  // --resize is given, if only as 0
   int32_t live_port = 0;
@@ -166,6 +169,7 @@ nlohmann::ordered_json options_of(const Arguments& a, const std::string& truth_f
                                  {"max_keyframes", o.max_keyframes},
                                  {"max_points", o.max_points},
                                  {"window", o.window},
+                                 {"keep_camera", o.correct_camera == 0},
                                  {"max_frames", a.flight.max_frames},
                                  {"every", a.flight.every},
                                  {"fps", a.fps}};
@@ -188,6 +192,8 @@ void make_files(const FlightResult& result, const std::string& name, OutputSet& 
   files.add("trajectory.txt", trajectory_text(flight, false));
   files.add("live.txt", trajectory_text(flight, true));
   files.add("report.html", flight_report(result, name));
+  if (flight.has_corrected_camera() && !files.is_input(kCameraFile))
+    files.add(kCameraFile, camera_yaml(flight.corrected_file_camera()));
   if (result.keyframes.empty()) return;
   files.add("keyframes.txt", keyframes_text(result));
   const std::string covariances = covariances_text(result.keyframes);
@@ -233,6 +239,11 @@ std::string summary(const FlightResult& result, const FrameSource& source, const
                        j["num_keyframes"].get<int>(), j["num_points"].get<int>(), segments,
                        segments == 1 ? "" : "s", j["num_relocalisations"].get<int>(),
                        j["num_loops"].get<int>());
+  if (const auto& shift = j["principal_point_shift_px"]; shift.is_array())
+    text += summary_line("camera",
+                         "many keyframes agree that its principal point is off: moved by "
+                         "(%.1f, %.1f) px",
+                         shift[0].get<double>(), shift[1].get<double>());
   const bool is_metric = j["scale"] == "metric";
   const double length = j["path_length"].get<double>();
   if (is_metric)
@@ -266,6 +277,7 @@ int odometry(Arguments& a) {
   Common& common = a.common;
   common.options.kernels = a.flight.odometry.kernels;
   a.flight.camera_file = a.camera;
+  a.flight.odometry.correct_camera = a.keeps_camera ? 0 : 1;
   if (a.flight.focal_35mm > 0 && !a.camera.empty())
     throw BadInput("--focal-35mm is for films and photographs without a camera file");
   const std::unique_ptr<FrameSource> source = open_source(a);
@@ -371,6 +383,9 @@ void add_odometry(CLI::App& program, Run& run) {
   add_number(*verb, "max-keyframes", &o.max_keyframes, 8, 2000, "most keyframes of the map");
   add_number(*verb, "max-points", &o.max_points, 500, 200000, "most points of the map");
   add_number(*verb, "window", &o.window, 3, 20, "keyframes that are adjusted together");
+  verb->add_flag(
+      "--keep-camera", a->keeps_camera,
+      "keep the principal point, also where many keyframes agree that it lies elsewhere");
   add_number(*verb, "seed", &o.seed, 0, kLargestSeed, "of the samplers");
   CLI::Option* resize = add_number(*verb, "resize", &a->flight.resize, 0, kMaxSide,
                                    "scale frames down to this longer side, pixels; 0: as they are");

@@ -236,6 +236,10 @@ Json flight_json(const FlightResult& result) {
         counts[s];
   json["scale"] = is_metric ? "metric" : "unit";
   json["scale_sigma"] = is_metric ? Json(state.scale_sigma) : Json(nullptr);
+  if (flight.has_corrected_camera())
+    json["principal_point_shift_px"] = state.principal_point_shift_px;
+  else
+    json["principal_point_shift_px"] = nullptr;
   json["time_ms"] = times_json(flight);
   json["context_bytes"] = flight.context_bytes();
   json["truth"] = truth_json(result, is_metric);
