@@ -231,10 +231,12 @@ std::string cards(const FlightResult& result) {
   text += card(std::to_string(j["num_loops"].get<int>()), "", "loops closed");
   text += number_card(j["path_length"], "%.4g", is_metric ? "m" : "",
                       is_metric ? "length of the path" : "length of the path, in first baselines");
-  if (const Json& shift = j["principal_point_shift_px"]; shift.is_array())
-    text += card(formatted("%.1f", shift[0].get<double>()) + ", " +
-                     formatted("%.1f", shift[1].get<double>()),
-                 "px", "by which the principal point was moved");
+  if (const Json& shift = j["principal_point_shift_px"]; shift.is_array()) {
+    const double x = shift[0].get<double>(), y = shift[1].get<double>();
+    text += card(formatted("%.1f", std::hypot(x, y)), "px",
+                 "by which the principal point was moved: " + formatted("%.1f", x) + ", " +
+                     formatted("%.1f", y));
+  }
   if (is_metric)
     text += number_card(j["scale_sigma"], "%.2g", "", "1 sigma of the scale, relative");
   text += number_card(j["time_ms"]["mean"], "%.2f", "ms", "CPU time a frame, mean");
