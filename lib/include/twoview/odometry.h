@@ -189,8 +189,8 @@ typedef struct tv_odometry_state {
   /* The standard deviation of the scale, relative to it; 0 where scale_source is TV_SCALE_UNIT. */
   double scale_sigma;
   /* By how far the principal point was moved from where it was given, in pixels (x, y): zeros where
-     the camera was not corrected. When it moves, all keyframes turn by about this many pixels, and
-     the path and the map are adjusted in the frames that follow. */
+     the camera was not corrected. When it moves, all keyframes turn by about the shift over the
+     focal length, and the path and the map are adjusted in the frames that follow. */
   double principal_point_shift_px[2];
 } tv_odometry_state;
 

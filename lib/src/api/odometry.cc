@@ -143,7 +143,7 @@ void enter_segment(tv_odometry* o, int32_t segment) {
 // bytes for each point of the map. No other stage takes a fifth of that, so what is added here is
 // what lies beside a window, and what the other stages take for each point and keyframe:
 // keypoints: 76 bytes (start.cc: the matches of a pair, the pair, and its inliers as matches) and a
-// PoseFit; keyframes: 120 (close_loop); points: 1 beside the window, or 8 without it (rank_points).
+// PoseFit; keyframes: 120 (close_loop); points: 8, where there is no window (rank_points).
 size_t scratch_bytes(const tv_odometry_options& o) {
   return adjust_bytes(o) + 128 * static_cast<size_t>(o.max_keypoints + o.max_keyframes) +
          4 * static_cast<size_t>(o.max_points);

@@ -83,7 +83,7 @@ size_t adjust_bytes(const tv_odometry_options& o) {
   return map_window_bytes(o, sizes) +
          2 * arena_bytes<int32_t>(static_cast<size_t>(o.max_keyframes)) +
          arena_bytes<double>(36 * static_cast<size_t>(sizes.views)) +
-         arena_bytes<uint8_t>(static_cast<size_t>(o.max_points));  // to spare
+         arena_bytes<uint8_t>(static_cast<size_t>(o.max_points));  // spare: marks took its place
 }
 
 void count_shared(Odometry* odometry, int32_t keyframe, int32_t* shared) {

@@ -17,7 +17,7 @@ Rigid move_principal_point(Odometry* odometry, const double to[2], const double 
                            int32_t first_keyframe);
 
 // Moves the principal point where the evidence is strong enough, and begins the adjustment of the
-// segment. `frame`, which has its pose in the map, turns with the keyframes.
+// segment. `frame`, the last one, turns with the keyframes.
 void correct_camera(Odometry* odometry, Frame* frame);
 
 }  // namespace tv

@@ -63,9 +63,9 @@ struct WeakLoop {
 struct Spread {
   int32_t num_steps;   // of the adjustment of many keyframes together
   int32_t next_place;  // then: of the points, from which on they are still to be adjusted
-  int32_t segment;     // of the loop
+  int32_t segment;     // that is adjusted
   int32_t first_id;    // of the keyframes that the steps adjust
-  int32_t last_id;     // of the keyframe that closed the loop
+  int32_t last_id;     // of the newest keyframe when it began
 };
 
 // The way since a frame in metres, in the world's axes, as the velocities say.

@@ -106,7 +106,7 @@ class Flight {
   // Whether attitudes were given, so that the map's z axis points down.
   bool is_upright() const { return is_upright_; }
   const tv_odometry_state& state() const { return state_; }
-  // With the principal point as the odometry has moved it.
+  // As frames are tracked; after finish() with the principal point as the odometry has moved it.
   const tv_camera& camera() const { return camera_; }
   // The camera of the frames as the source gives them, before they are scaled down.
   const tv_camera& file_camera() const { return file_camera_; }
