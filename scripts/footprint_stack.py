@@ -56,8 +56,8 @@ def kernels_of(source):
     file that names none, or lies outside the library, may call any kernel."""
     if not source.exists():
         return frozenset()
-    list_of_all = (SOURCES / "kernels/kernels.h").read_text()
-    names = set(re.findall(r"X\((\w+), ", list_of_all))
+    lists = [(SOURCES / "kernels" / name).read_text() for name in ("kernels.h", "blocks.h")]
+    names = set(re.findall(r"X\((\w+), ", "".join(lists)))
     return frozenset(names & set(re.findall(r"(?:->|\.)(\w+)", source.read_text())))
 
 
@@ -100,7 +100,7 @@ def read_graphs(folder):
     if not files:
         sys.exit(f"{folder}: no .ci files; build with -fcallgraph-info=su")
     for path in files:
-        is_kernel_file = path.parent.name == "kernels" and not path.name.startswith("select.")
+        is_kernel_file = path.parent.name == "kernels" and not path.name.startswith("select")
         if is_kernel_file:
             kernels.read(path, "kernels")
         elif path.name.endswith(".ltrans.ci"):  # written as a library was linked, of many files

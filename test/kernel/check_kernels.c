@@ -1,7 +1,7 @@
 /* Every kernel of every set that this machine runs, against the C set: the same bytes out of random
    and extreme data, odd sizes and misaligned pointers, and nothing written outside the outputs.
    Inputs are heap blocks of the exact size, so the address sanitizer sees a read beyond them.
-   The cases come from TVK_LIST: a kernel without a case does not link.
+   The cases come from TVK_LIST and TVK_BLOCKS_LIST: a kernel without a case does not compile.
 
    check_kernels          runs the checks
    check_kernels --time   prints nanoseconds per call of typical size, a column per set */
@@ -14,10 +14,16 @@
 #include <time.h>
 #include <unity.h>
 
-#include "kernels/kernels.h"
+#include "kernels/blocks.h"
 #include "support/random.h"
 #include "twoview/context.h"
 #include "twoview/triangulate.h"
+
+#if defined(TWOVIEW_HAS_ODOMETRY)
+#define ALL_KERNELS(X) TVK_LIST(X) TVK_BLOCKS_LIST(X)
+#else
+#define ALL_KERNELS(X) TVK_LIST(X)
+#endif
 
 enum { MAX_BLOCKS = 32, GUARD_BYTES = 64, PATTERN = 0xA5, ROUNDS = 600 };
 
@@ -703,6 +709,7 @@ static void case_triangulate(trial *t) {
   TEST_ASSERT_EQUAL_INT(expected, *any);
 }
 
+#if defined(TWOVIEW_HAS_ODOMETRY)
 static void case_subtract_products(trial *t) {
   const int32_t num_rows = pick(t, 1, 20, 10), num_entries = 18 * num_rows * (num_rows + 1);
   double *entries = OUTPUT(t, double, num_entries), *columns = INPUT(t, double, 18 * num_rows);
@@ -712,22 +719,38 @@ static void case_subtract_products(trial *t) {
   }
   for (k = 0; k < num_entries; ++k) entries[k] = 2 * random_unit(&t->seed) - 1;
   for (k = 0; k < 18 * num_rows; ++k) columns[k] = 2 * random_unit(&t->seed) - 1;
-  REPEAT(t, t->set->subtract_products(entries, columns, blocks, num));
+  REPEAT(t, tvk_blocks_of(t->set)->subtract_products(entries, columns, 6 * num_rows, blocks, num));
 }
 
-static void case_add_view_terms(trial *t) {
-  const int32_t stride = 6 * pick(t, 1, 5, 5);
-  double *part = INPUT(t, double, 18), *reduced = OUTPUT(t, double, 5 * stride + 6);
-  double *gradient = OUTPUT(t, double, 6), *diagonal = OUTPUT(t, double, 6);
-  double *columns = OUTPUT(t, double, 18);
+static void case_add_observation(trial *t) {
+  const int32_t num_blocks = pick(t, 1, 5, 5), pitch = 6 * pick(t, 1, 5, 5);
+  const int32_t num_entries = 18 * num_blocks * (num_blocks + 1);
+  double *observation = INPUT(t, double, 9), *R = INPUT(t, double, 9),
+         *linear = INPUT(t, double, 9);
+  double *sums = OUTPUT(t, double, 9), *entries = OUTPUT(t, double, num_entries);
+  double *diagonal = OUTPUT(t, double, 6 * num_blocks);
+  double *gradient = OUTPUT(t, double, 6 * num_blocks);
+  double *columns = OUTPUT(t, double, 2 * pitch + 6);
+  const tvk_reduced_system system = {entries, diagonal, gradient};
+  /* -1: the view is held. */
+  const int32_t idx = t->typical ? num_blocks - 1 : random_int(&t->seed, -1, num_blocks - 1);
   int32_t k;
-  for (k = 0; k < 18; ++k) part[k] = 2 * random_unit(&t->seed) - 1;
-  for (k = 0; k < 5 * stride + 6; ++k) reduced[k] = 2 * random_unit(&t->seed) - 1;
-  for (k = 0; k < 6; ++k) gradient[k] = 2 * random_unit(&t->seed) - 1;
-  for (k = 0; k < 6; ++k) diagonal[k] = 2 * random_unit(&t->seed) - 1;
-  for (k = 0; k < 18; ++k) columns[k] = 2 * random_unit(&t->seed) - 1;
-  REPEAT(t, t->set->add_view_terms(part, reduced, stride, gradient, diagonal, columns));
+  for (k = 0; k < 9; ++k) {
+    observation[k] = 2 * random_unit(&t->seed) - 1;
+    R[k] = 2 * random_unit(&t->seed) - 1;
+    linear[k] = 2 * random_unit(&t->seed) - 1;
+    sums[k] = 2 * random_unit(&t->seed) - 1;
+  }
+  /* Without a loss, nothing is weighed. */
+  if (random_int(&t->seed, 0, 2) == 0) linear[6] = linear[7] = 1, linear[8] = 0;
+  for (k = 0; k < num_entries; ++k) entries[k] = 2 * random_unit(&t->seed) - 1;
+  for (k = 0; k < 2 * pitch + 6; ++k) columns[k] = 2 * random_unit(&t->seed) - 1;
+  for (k = 0; k < 6 * num_blocks; ++k) gradient[k] = 2 * random_unit(&t->seed) - 1;
+  for (k = 0; k < 6 * num_blocks; ++k) diagonal[k] = 2 * random_unit(&t->seed) - 1;
+  REPEAT(t, tvk_blocks_of(t->set)->add_observation(observation, R, linear, sums, &system, idx,
+                                                   columns, pitch));
 }
+#endif
 
 static trial make_trial(const tvk_table *set, uint64_t seed, int typical, int64_t calls) {
   trial t;
@@ -792,7 +815,7 @@ static void check(const char *name, void (*run)(trial *)) {
 
 #define TEST(name, result, parameters) \
   static void test_##name##_equals_the_c_set(void) { check(#name, case_##name); }
-TVK_LIST(TEST)
+ALL_KERNELS(TEST)
 #undef TEST
 
 static double now_ns(void) {
@@ -842,7 +865,7 @@ static int print_all_times(void) {
   for (n = 0; tvk_nth(n) != NULL; ++n) printf(" %10s", name_of(n));
   printf("\n");
 #define TIME(name, result, parameters) print_times(#name, case_##name);
-  TVK_LIST(TIME)
+  ALL_KERNELS(TIME)
 #undef TIME
   return 0;
 }
@@ -885,7 +908,7 @@ int main(int argc, char **argv) {
   UNITY_BEGIN();
   RUN_TEST(test_the_sets_are_those_of_this_cpu);
 #define RUN(name, result, parameters) RUN_TEST(test_##name##_equals_the_c_set);
-  TVK_LIST(RUN)
+  ALL_KERNELS(RUN)
 #undef RUN
   return UNITY_END();
 }

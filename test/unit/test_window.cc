@@ -146,20 +146,17 @@ void test_a_residual_is_the_projection_near_its_pixel() {
   }
 }
 
-// What an observation adds to its view. Its rows by (w, v) are what it adds to the columns where
-// its Jp is the identity's first two rows.
-struct ViewTerms {
-  double rows[3][6], block[6][6], gradient[6], diagonal[6];
+// What an observation adds to its point and to its view, the second one of two.
+struct Terms {
+  double sums[9], entries[36 + 72], diagonal[12], gradient[12], columns[3][6];
 };
 
-ViewTerms view_terms(tv::LinearObservation part) {
-  ViewTerms terms{};
-  for (int r = 0; r < 2; ++r) {
-    for (int i = 0; i < 3; ++i) part.Jp[r][i] = r == i;
-  }
-  tvk_select(TV_KERNELS_AUTO)
-      ->add_view_terms(reinterpret_cast<const double*>(&part), terms.block[0], 6, terms.gradient,
-                       terms.diagonal, terms.rows[0]);
+Terms terms_of(const tv::WindowObservation& o, const double R[9],
+               const tv::LinearObservation& linear) {
+  Terms terms{};
+  const tvk_reduced_system system = {terms.entries, terms.diagonal, terms.gradient};
+  tvk_blocks_of(tvk_select(TV_KERNELS_AUTO))
+      ->add_observation(o.J, R, linear.x, terms.sums, &system, 1, terms.columns[0], 6);
   return terms;
 }
 
@@ -189,51 +186,77 @@ void test_derivatives_of_an_observation_agree_with_differences() {
       const double s = error_sq(o, at.x, e);
       const tv::LossSlope bent = tv::slope_of(options, s);
       if (std::fabs(s - options.loss_scale_px * options.loss_scale_px) < 1e-2) continue;
+      double R[9], turn[3];
+      for (double& w : turn) w = random.normal();
+      window_scene::rotation(turn, R);
       tv::linearise(options, {1.0, false}, o, &at);
+      const Terms weighed = terms_of(o, R, at);
       double scale = 0;
       for (int i = 0; i < 3; ++i) scale += std::fabs(slope[0][i]) + std::fabs(slope[1][i]);
+      // By the point in the frame of the world: x = R X + t.
+      double by_point[2][3] = {}, of_point[3] = {};
       for (int i = 0; i < 3; ++i) {
-        TEST_ASSERT_TRUE(std::fabs(at.q[i] - gradient[i]) <=
+        for (int c = 0; c < 3; ++c) {
+          for (int r = 0; r < 2; ++r) by_point[r][c] += slope[r][i] * R[3 * i + c];
+          of_point[c] += gradient[i] * R[3 * i + c];
+        }
+      }
+      for (int i = 0, slot = 0; i < 3; ++i) {
+        TEST_ASSERT_TRUE(std::fabs(weighed.sums[6 + i] - of_point[i]) <=
                          1e-5 * scale * (1 + bent.weight * std::sqrt(s)));
-        for (int j = 0; j < 3; ++j) {
+        for (int j = i; j < 3; ++j, ++slot) {
           // rho' (J'J + bend J'e e'J / s), of which nothing negative is kept.
           double H = 0, along[2] = {0, 0};
           for (int r = 0; r < 2; ++r) {
-            H += slope[r][i] * slope[r][j];
-            along[0] += e[r] * slope[r][i], along[1] += e[r] * slope[r][j];
+            H += by_point[r][i] * by_point[r][j];
+            along[0] += e[r] * by_point[r][i], along[1] += e[r] * by_point[r][j];
           }
           H += std::max(bent.bend, -1.0) * along[0] * along[1] / s;
-          const double ours = at.h[0][i] * at.h[0][j] + at.h[1][i] * at.h[1][j];
-          TEST_ASSERT_TRUE(std::fabs(ours - bent.weight * H) <= 1e-5 * scale * scale);
+          TEST_ASSERT_TRUE(std::fabs(weighed.sums[slot] - bent.weight * H) <= 1e-5 * scale * scale);
         }
       }
       // By the pose: x -> exp([w]x) x + v.
       tv::linearise(options_of(TV_LOSS_NONE, 1), {0.0, false}, o, &at);
-      const ViewTerms terms = view_terms(at);
-      for (int r = 0; r < 2; ++r) {
-        for (int i = 0; i < 6; ++i) {
-          double e_of[2][2];
-          for (int side = 0; side < 2; ++side) {
-            const double step = (side == 0 ? -1 : 1) * kStep;
-            double w[3] = {0, 0, 0}, v[3] = {0, 0, 0}, R[9], x[3];
-            (i < 3 ? w[i] : v[i - 3]) = step;
-            window_scene::rotation(w, R);
-            window_scene::transform(R, v, at.x, x);
-            error_sq(o, x, e_of[side]);
-          }
-          const double difference = (e_of[1][r] - e_of[0][r]) / (2 * kStep);
-          TEST_ASSERT_TRUE(std::fabs(difference - terms.rows[r][i]) <= 1e-5 * scale * depth);
+      const Terms terms = terms_of(o, R, at);
+      double by_pose[2][6];
+      for (int i = 0; i < 6; ++i) {
+        double e_of[2][2];
+        for (int side = 0; side < 2; ++side) {
+          const double step = (side == 0 ? -1 : 1) * kStep;
+          double w[3] = {0, 0, 0}, v[3] = {0, 0, 0}, turned[9], x[3];
+          (i < 3 ? w[i] : v[i - 3]) = step;
+          window_scene::rotation(w, turned);
+          window_scene::transform(turned, v, at.x, x);
+          error_sq(o, x, e_of[side]);
         }
+        for (int r = 0; r < 2; ++r) by_pose[r][i] = (e_of[1][r] - e_of[0][r]) / (2 * kStep);
       }
       error_sq(o, at.x, e);
+      const double size = 1e-5 * scale * depth;  // of one derivative by the pose
+      double largest = 0;
       for (int i = 0; i < 6; ++i) {
-        const double *a = terms.rows[0], *b = terms.rows[1];
-        const double size = 1e-12 * scale * scale * (1 + depth) * (1 + depth);
-        TEST_ASSERT_DOUBLE_WITHIN(size * (1 + std::sqrt(s)), e[0] * a[i] + e[1] * b[i],
-                                  terms.gradient[i]);
-        TEST_ASSERT_DOUBLE_WITHIN(size, a[i] * a[i] + b[i] * b[i], terms.diagonal[i]);
+        largest = std::max(largest, std::fabs(by_pose[0][i]) + std::fabs(by_pose[1][i]));
+      }
+      const auto product = [](const double a[2], double b0, double b1) {
+        return a[0] * b0 + a[1] * b1;
+      };
+      for (int i = 0; i < 36; ++i) TEST_ASSERT_EQUAL_DOUBLE(0, terms.entries[i]);
+      for (int i = 0; i < 6; ++i) {
+        const double of_i[2] = {by_pose[0][i], by_pose[1][i]};
+        const double* row = terms.entries + 36 + 12 * i;  // of two blocks
+        TEST_ASSERT_DOUBLE_WITHIN(size * (1 + std::sqrt(s)), product(of_i, e[0], e[1]),
+                                  terms.gradient[6 + i]);
+        TEST_ASSERT_DOUBLE_WITHIN(2 * size * largest, product(of_i, of_i[0], of_i[1]),
+                                  terms.diagonal[6 + i]);
         for (int j = 0; j < 6; ++j) {
-          TEST_ASSERT_DOUBLE_WITHIN(size, a[i] * a[j] + b[i] * b[j], terms.block[i][j]);
+          TEST_ASSERT_DOUBLE_WITHIN(2 * size * largest, product(of_i, by_pose[0][j], by_pose[1][j]),
+                                    row[6 + j]);
+          TEST_ASSERT_EQUAL_DOUBLE(0, row[j]);
+        }
+        for (int c = 0; c < 3; ++c) {
+          TEST_ASSERT_DOUBLE_WITHIN(2 * size * scale + 1e-5 * scale * largest,
+                                    product(of_i, by_point[0][c], by_point[1][c]),
+                                    terms.columns[c][i]);
         }
       }
     }
@@ -371,7 +394,7 @@ Eigen::MatrixXd random_matrix(Random* random, int rows, int columns) {
 void expect_solution(const Eigen::MatrixXd& whole, int blocks, Random* random) {
   const int n = 6 * blocks;
   const Eigen::VectorXd b = random_matrix(random, n, 1);
-  const tvk_table* kernels = tvk_select(TV_KERNELS_AUTO);
+  const tvk_blocks* kernels = tvk_blocks_of(tvk_select(TV_KERNELS_AUTO));
   tv::Arena measure = tv::measuring_arena();
   tv::block_matrix(blocks, kernels, measure);
   memory.resize(measure.used_bytes + 64);

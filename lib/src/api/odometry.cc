@@ -104,6 +104,14 @@ tv_status make_plan(const tv_camera* camera, const tv_odometry_options* options,
   return status;
 }
 
+// Whether a state that is written overlaps what is read.
+bool overlaps(const tv_odometry_state* state, const void* input, size_t input_bytes,
+              const tv_image& image) {
+  const size_t bytes = state->struct_size;
+  return overlap(state, bytes, input, input_bytes) ||
+         overlap(state, bytes, image.data, image_bytes(image));
+}
+
 }  // namespace
 
 void start_anew(tv_odometry* o) {
@@ -242,10 +250,7 @@ tv_status tv_odometry_track(tv_odometry* odometry, const tv_odometry_frame* fram
   if (!tv::is_finite(input.time_s)) return TV_ERR_NOT_FINITE;
   if (!tv::within(input.gap, 0, 1)) return TV_ERR_ARGUMENT;
   if (odometry->num_frames > 0 && !(input.time_s > odometry->last_time_s)) return TV_ERR_ARGUMENT;
-  if (tv::overlap(state, state->struct_size, frame, frame->struct_size) ||
-      tv::overlap(state, state->struct_size, input.image.data, tv::image_bytes(input.image))) {
-    return TV_ERR_OVERLAP;
-  }
+  if (tv::overlaps(state, frame, frame->struct_size, input.image)) return TV_ERR_OVERLAP;
   tv_odometry_state packed{};
   tv::track_frame(odometry, input, &packed);
   tv::write_sized(packed, state);
@@ -270,10 +275,7 @@ tv_status tv_odometry_locate(tv_odometry* odometry, const tv_image* image, int32
   tv_status status = tv::check_sized(state);
   if (status == TV_OK) status = tv::check_camera_image(odometry->camera.model, *image);
   if (status != TV_OK) return status;
-  if (tv::overlap(state, state->struct_size, image, sizeof *image) ||
-      tv::overlap(state, state->struct_size, image->data, tv::image_bytes(*image))) {
-    return TV_ERR_OVERLAP;
-  }
+  if (tv::overlaps(state, image, sizeof *image, *image)) return TV_ERR_OVERLAP;
   tv_odometry_state packed{};
   tv::locate_frame(odometry, *image, near_id, &packed);
   tv::write_sized(packed, state);

@@ -58,7 +58,9 @@ tv_status read_counts(const tv_window* given, tv_window* window) {
   return valid ? TV_OK : TV_ERR_ARGUMENT;
 }
 
-bool is_index(int32_t idx, int32_t count) { return idx >= 0 && idx < count; }
+bool is_index(int32_t idx, int32_t count) {
+  return static_cast<uint32_t>(idx) < static_cast<uint32_t>(count);  // count is not negative
+}
 
 // Whether a direction has a length whose square is neither 0 nor infinite.
 bool is_direction(const double v[3]) {

@@ -7,10 +7,6 @@
 
 #include "geometry/camera.h"
 
-// Put before a loop of three turns, which is then straight code even where the compiler would leave
-// it.
-#define TV_UNROLL _Pragma("GCC unroll 3")
-
 namespace tv {
 
 // Inlined even where the compiler optimises for size: as a call, it adds 4 % to the instructions of
@@ -39,7 +35,6 @@ inline void rotate(const Mat3& R, const double v[3], double rotated[3]) {
 
 // R'v, with R row-major.
 inline void rotate_back(const double R[9], const double v[3], double out[3]) {
-  TV_UNROLL
   for (int i = 0; i < 3; ++i) out[i] = (R[i] * v[0] + R[3 + i] * v[1]) + R[6 + i] * v[2];
 }
 

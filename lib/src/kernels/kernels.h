@@ -246,19 +246,7 @@ typedef struct tvk_triangulate_pair {
    triangulate: the points of `count` matches of two pinholes by Midpoint, Linear-LS or Iterative-LS
    (`method`, a tv_triangulation). A pixel is two numbers, x and y. A match whose point is neither
    TV_POINT_OK nor TV_POINT_BEHIND, or that needs more care, gets status -1 and zeros; the caller
-   solves it by geometry/triangulation.cc. Returns whether there is such a match.
-
-   subtract_products: of a symmetric matrix whose lower triangle is stored as in
-   odometry/block_cholesky.h, subtracts Z_a Z_b' from the 6x6 blocks (blocks[a], blocks[b]) for all
-   a and all b <= a, where blocks ascends. Z_a is 6x3, with its columns one after the other at
-   columns + 18 a. The three products are added first, so that each entry changes once.
-
-   add_view_terms: adds the terms of an observation of an adjusted view to the view's block of that
-   matrix, whose rows are `stride` entries apart, to its gradient and its diagonal (6 each), and to
-   three columns of 6. The observation is a tv::LinearObservation (odometry/window_observation.h),
-   18 numbers: x, h (2x3), q, J (2x3). With rows a = (x cross h0, h0), b = (x cross h1, h1) and
-   g = (x cross q, q), the block grows by a'a + b'b, the gradient by g, and column i by
-   J0i a + J1i b. */
+   solves it by geometry/triangulation.cc. Returns whether there is such a match. */
 #define TVK_PIXEL_LIST(X)                                                                          \
   X(fast_score_row, void,                                                                          \
     (const uint8_t *const rows[7], int32_t width, int32_t arc, int32_t threshold,                  \
@@ -320,12 +308,7 @@ typedef struct tvk_triangulate_pair {
     (const double *rays, int32_t num_samples, double *essentials, int32_t *counts))         \
   X(triangulate, int32_t,                                                                   \
     (const tvk_triangulate_pair *pair, int32_t method, const double *pixels0,               \
-     const double *pixels1, int32_t count, struct tv_point *points))                        \
-  X(subtract_products, void,                                                                \
-    (double *entries, const double *columns, const int32_t *blocks, int32_t num))           \
-  X(add_view_terms, void,                                                                   \
-    (const double *part, double *block, int32_t stride, double *gradient, double *diagonal, \
-     double *columns))
+     const double *pixels1, int32_t count, struct tv_point *points))
 
 #define TVK_LIST(X) TVK_PIXEL_LIST(X) TVK_MATCH_LIST(X)
 

@@ -11,10 +11,6 @@
 #define tvk_transfer_squares_avx512 tvk_transfer_squares_avx2
 #define tvk_transfer_sums_avx512 tvk_transfer_sums_avx2
 
-/* A row of a block is six doubles, which fill no vector of eight. */
-#define tvk_subtract_products_avx512 tvk_subtract_products_avx2
-#define tvk_add_view_terms_avx512 tvk_add_view_terms_avx2
-
 /* These kernels are other sets', which are as fast, or whose difference does not show in the time
    of a pair. */
 #define hessian_determinants tvk_hessian_determinants_avx2

@@ -20,7 +20,6 @@ TVK_MATCH_LIST(TVK_DECLARE)
 #include "kernels/relpose_5pt.h"
 #include "kernels/sampson.h"
 #if !defined(TVK_AVX512) /* the AVX-512 set uses these kernels of the AVX2 set */
-#include "kernels/block_products.h"
 #include "kernels/transfer.h"
 #endif
 #include "kernels/triangulate.h"

@@ -28,12 +28,12 @@ int factorise_block(double* block, int stride, const double* diagonal, double sm
   return vanished;
 }
 
-// A block below the diagonal becomes that of the factor, of which `halves` receives a copy, the
-// columns 0 to 2 and 3 to 5.
+// A block below the diagonal becomes that of the factor, of which `columns` receives a copy; its
+// columns are `pitch` entries apart.
 void solve_block(const double* factor, int factor_stride, const double* inverses, double* block,
-                 int stride, Columns* const halves[2]) {
+                 int stride, double* columns, int pitch) {
   for (int c = 0; c < kBlock; ++c) {
-    double* column = reinterpret_cast<double*>(halves[c / 3]->at) + c % 3 * kBlock;
+    double* column = columns + c * pitch;
     for (int r = 0; r < kBlock; ++r) {
       double value = block[r * stride + c];
       for (int k = 0; k < c; ++k) value -= block[r * stride + k] * factor[c * factor_stride + k];
@@ -57,7 +57,7 @@ bool is_zero(const double* block, int stride) {
 
 }  // namespace
 
-BlockMatrix block_matrix(int num_blocks, const tvk_table* kernels, Arena& arena) {
+BlockMatrix block_matrix(int num_blocks, const tvk_blocks* kernels, Arena& arena) {
   const size_t blocks = static_cast<size_t>(num_blocks), n = kBlock * blocks;
   BlockMatrix A;
   A.num_blocks = num_blocks;
@@ -65,16 +65,13 @@ BlockMatrix block_matrix(int num_blocks, const tvk_table* kernels, Arena& arena)
   A.entries = arena_alloc<double>(arena, block_entries(num_blocks));
   A.inverses = arena_alloc<double>(arena, n);
   A.diagonal = arena_alloc<double>(arena, n);
-  A.panel = arena_alloc<Columns>(arena, 2 * blocks);
+  A.panel = reinterpret_cast<double*>(arena_alloc<Pair>(arena, 3 * n));
   A.below = arena_alloc<int32_t>(arena, blocks);
   return A;
 }
 
-void subtract_products(const BlockMatrix& A, const Columns* Z, const int32_t* blocks, int num) {
-  A.kernels->subtract_products(A.entries, reinterpret_cast<const double*>(Z), blocks, num);
-}
-
 int factorise(const BlockMatrix& A, double smallest) {
+  const int pitch = kBlock * A.num_blocks;
   int vanished = 0;
   for (int j = 0; j < A.num_blocks; ++j) {
     double* corner = block_at(A, j, j);
@@ -85,12 +82,13 @@ int factorise(const BlockMatrix& A, double smallest) {
     for (int i = j + 1; i < A.num_blocks; ++i) {
       double* block = block_at(A, i, j);
       if (is_zero(block, row_entries(i))) continue;
-      Columns* const halves[2] = {A.panel + num, A.panel + A.num_blocks + num};
-      solve_block(corner, stride, inverses, block, row_entries(i), halves);
+      double* columns = A.panel + kBlock * num;
+      solve_block(corner, stride, inverses, block, row_entries(i), columns, pitch);
       A.below[num++] = i;
     }
-    subtract_products(A, A.panel, A.below, num);
-    subtract_products(A, A.panel + A.num_blocks, A.below, num);
+    for (int half = 0; half < 2; ++half) {
+      A.kernels->subtract_products(A.entries, A.panel + 3 * half * pitch, pitch, A.below, num);
+    }
   }
   return vanished;
 }

@@ -7,7 +7,7 @@
 #include <cstdint>
 
 #include "base/arena.h"
-#include "kernels/kernels.h"
+#include "kernels/blocks.h"
 
 namespace tv {
 
@@ -18,23 +18,18 @@ typedef double Pair __attribute__((vector_size(16)));
 inline constexpr int kBlock = 6;
 inline constexpr int kBlockPairs = 3;
 
-// Three columns of a panel of six rows: column m has the entries [3 m], [3 m + 1], [3 m + 2].
-struct Columns {
-  Pair at[3 * kBlockPairs];
-};
-
 struct BlockMatrix {
   int num_blocks;
-  const tvk_table* kernels;
+  const tvk_blocks* kernels;
   double* entries;  // the rows of blocks down to the diagonal, one after the other; 16-byte aligned
   double* inverses;  // of the factor's diagonal, or 0 where a pivot vanished
   double* diagonal;  // of A, which decides when a pivot has vanished
-  Columns* panel;    // scratch: 2 for each block
+  double* panel;     // scratch: 36 for each block
   int32_t* below;    // scratch: the blocks of a column that are not zero
 };
 
 // Uninitialised. A smaller num_blocks may be set afterwards.
-BlockMatrix block_matrix(int num_blocks, const tvk_table* kernels, Arena& arena);
+BlockMatrix block_matrix(int num_blocks, const tvk_blocks* kernels, Arena& arena);
 
 // How many entries so many rows of blocks have.
 inline size_t block_entries(int num_blocks) {
@@ -54,10 +49,6 @@ inline double* diagonal_at(const BlockMatrix& A, int i) {
   const int row = i / kBlock, k = i % kBlock;
   return block_at(A, row, row) + k * row_entries(row) + k;
 }
-
-// Subtracts Z_a Z_b' from the blocks (blocks[a], blocks[b]) for all a and all b <= a, where blocks
-// ascends.
-void subtract_products(const BlockMatrix& A, const Columns* Z, const int32_t* blocks, int num);
 
 // Factorises A in place. A pivot of at most `smallest` times its entry of `diagonal` counts as
 // zero, and its unknown becomes 0. Returns how many did.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 
 #include "robust/ldlt.h"
 
@@ -148,10 +149,9 @@ void pose_equations(const PoseProblem& problem, const Pose& pose, PoseEquations*
     // Both rows at once, one in each lane.
     Doubles row[6];
     for (int c = 0; c < 3; ++c) row[3 + c] = Doubles{at.rows[0][c], at.rows[1][c]};
-    for (int c = 0; c < 3; ++c) {
-      const int d = (c + 1) % 3, b = (c + 2) % 3;
-      row[c] = turned[d] * row[3 + b] - turned[b] * row[3 + d];
-    }
+    row[0] = turned[1] * row[5] - turned[2] * row[4];
+    row[1] = turned[2] * row[3] - turned[0] * row[5];
+    row[2] = turned[0] * row[4] - turned[1] * row[3];
     const Doubles error = {at.error[0], at.error[1]};
     Doubles* sum = sums;
     for (int a = 0; a < 6; ++a) {
@@ -160,8 +160,11 @@ void pose_equations(const PoseProblem& problem, const Pose& pose, PoseEquations*
       sums[21 + a] += weighted * error;
     }
   }
-  for (int k = 0; k < 21; ++k) e->upper[k] = sums[k][0] + sums[k][1];
-  for (int k = 0; k < 6; ++k) e->gradient[k] = sums[21 + k][0] + sums[21 + k][1];
+  static_assert(offsetof(PoseEquations, upper) == 0 && sizeof e->upper == 21 * sizeof(double) &&
+                    offsetof(PoseEquations, gradient) == sizeof e->upper,
+                "the sums are written as one array");
+  double* total = reinterpret_cast<double*>(e);
+  for (const Doubles& sum : sums) *total++ = sum[0] + sum[1];
   if (!(problem.gravity.weight > 0)) return;
   const Vec3 h = pose.R * problem.gravity.in_world;
   const Vec3 slope = problem.gravity.in_camera.cross(h);

@@ -63,7 +63,7 @@ void choose_views(Window* window, tv_window_result* result) {
     WindowPoint* point = &window->points[p];
     for (int k = point->begin; k < point->end; ++k) {
       WindowObservation* o = &window->observations[k];
-      o->slot = -1;
+      o->slot = 0;
       if (block[o->view] < 0) continue;
       const bool same = k > point->begin && o[-1].view == o->view;
       if (!same) window->slot_block[point->begin + point->num_slots++] = block[o->view];
@@ -85,7 +85,7 @@ double solve_views(const Window& window, double damping, double* damped) {
     for (int i = group; i < group + 3; ++i) {
       A.diagonal[i] = std::max(A.diagonal[i], kLeastEntry * largest);
       *diagonal_at(A, i) += damping * A.diagonal[i];
-      window.step[i] = -window.gradient[i];
+      window.step[i] = -window.reduced.gradient[i];
     }
   }
   factorise(A, kVanished);
@@ -244,7 +244,7 @@ void hold_free_parameters(const Window& window, bool scale_is_free) {
 void write_covariances(const Window& window, int held, double scale, double* covariances) {
   const BlockMatrix& A = window.system;
   const int size = kBlock * window.num_blocks;
-  double* columns = reinterpret_cast<double*>(A.panel);  // as large as six columns
+  double* columns = A.panel;  // as large as six columns
   for (int v = 0; v < window.given.num_views; ++v) {
     const int block = window.block[v];
     if (block < 0 || v == held) continue;
@@ -316,7 +316,7 @@ struct Gathering {
 };
 
 // The arrays of a window of which every view is adjusted.
-__attribute__((noinline)) Gathering take_arrays(const tvk_table* kernels, Arena& arena,
+__attribute__((noinline)) Gathering take_arrays(const tvk_blocks* kernels, Arena& arena,
                                                 Window* window) {
   const tv_window& given = window->given;
   const size_t views = count_of(given.num_views), points = count_of(given.num_points);
@@ -326,13 +326,14 @@ __attribute__((noinline)) Gathering take_arrays(const tvk_table* kernels, Arena&
   window->block = arena_alloc<int32_t>(arena, views);
   window->observations = arena_alloc<WindowObservation>(arena, observations);
   window->slot_block = arena_alloc<int32_t>(arena, observations);
-  window->Z = arena_alloc<Columns>(arena, observations);
+  window->Z = arena_alloc<Pair>(arena, 3 * kBlockPairs * observations);
   window->points = arena_alloc<WindowPoint>(arena, points);
   window->position = arena_alloc<double>(arena, 3 * points);
   window->next_position = arena_alloc<double>(arena, 3 * points);
   window->eliminated = arena_alloc<EliminatedPoint>(arena, points);
   window->system = block_matrix(given.num_views, kernels, arena);
-  window->gradient = arena_alloc<double>(arena, kBlock * views);
+  window->reduced = {window->system.entries, window->system.diagonal,
+                     arena_alloc<double>(arena, kBlock * views)};
   window->step = arena_alloc<double>(arena, kBlock * views);
   Gathering gathering;
   gathering.cameras = arena_alloc<Camera>(arena, count_of(given.num_cameras));
@@ -354,7 +355,7 @@ bool adjust_window(const tv_window& given, const tv_window_options& options,
                    const WindowStart& start, Arena& arena, double* covariances, float* errors_px,
                    tv_window_result* result) {
   Window window{given, options};
-  const Gathering gathering = take_arrays(start.kernels, arena, &window);
+  const Gathering gathering = take_arrays(tvk_blocks_of(start.kernels), arena, &window);
   for (int v = 0; v < given.num_views; ++v) {
     std::memcpy(window.pose[v].R, given.views[v].R, sizeof window.pose[v].R);
     std::memcpy(window.pose[v].t, given.views[v].t, sizeof window.pose[v].t);

@@ -24,7 +24,7 @@ bool make_observation(const Camera& camera, const tv_observation& given, const d
   Mat23 J;
   if (!project(camera, ray, &pixel, &J)) return false;
   const double sigma = given.sigma == 0.0f ? 1.0 : static_cast<double>(given.sigma);
-  for (int i = 0; i < 6; ++i) out->J[i] = J.data()[i] / sigma;
+  for (int i = 0; i < 6; ++i) out->J[i] = J(i % 2, i / 2) / sigma;
   for (int i = 0; i < 3; ++i) out->n[i] = sphere ? ray[i] : i == 2 ? 1.0 : 0.0;
   return true;
 }

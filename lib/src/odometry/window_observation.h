@@ -15,10 +15,10 @@ namespace tv {
 // derivative of the projection at the pixel's own ray, so J ray = 0. A point is in front if n'x >
 // 0.
 struct WindowObservation {
-  double J[6];  // 2x3, row-major
+  double J[6];  // 2x3, column-major
   double n[3];  // (0, 0, 1); for Kannala-Brandt the unit ray
   int32_t view;
-  int32_t slot;  // which one of the point's adjusted views this is; -1 where the view is held
+  int32_t slot;  // which one of the point's adjusted views this is; 0 where the view is held
   int32_t idx;   // the index in the caller's array
   int32_t reserved;
 };
@@ -40,8 +40,8 @@ inline bool residual_at(const WindowObservation& o, const double x[3], Residual*
   if (!(depth > 1e-6 * ((std::fabs(x[0]) + std::fabs(x[1])) + std::fabs(x[2])))) return false;
   const double inverse = 1.0 / depth;
   out->inverse_depth = inverse;
-  out->e[0] = ((o.J[0] * x[0] + o.J[1] * x[1]) + o.J[2] * x[2]) * inverse;
-  out->e[1] = ((o.J[3] * x[0] + o.J[4] * x[1]) + o.J[5] * x[2]) * inverse;
+  out->e[0] = ((o.J[0] * x[0] + o.J[2] * x[1]) + o.J[4] * x[2]) * inverse;
+  out->e[1] = ((o.J[1] * x[0] + o.J[3] * x[1]) + o.J[5] * x[2]) * inverse;
   return true;
 }
 
@@ -68,45 +68,32 @@ struct LossCurvature {
   bool averaged;  // instead: all of it, as its mean over all directions
 };
 
-// An observation, linearised, as the kernel add_view_terms takes it. h: d residual / d x, weighed
-// so that h'h is half its Hessian; q: half its gradient by x; Jp: h R, by the point in the world's
-// frame. By the view's (w, v), the derivatives are (x cross h, h).
+// What the kernel add_observation takes of an observation, which is linear there: h, its
+// derivatives by x, become root (h - along e (e'h)), of which the squares are half its Hessian.
 struct LinearObservation {
   double x[3];  // the point in the frame of the camera: given
-  double h[2][3], q[3], Jp[2][3];
+  Residual residual;
+  double weight, root, along;
 };
-static_assert(sizeof(LinearObservation) == 18 * sizeof(double), "as kernels.h says");
+static_assert(sizeof(LinearObservation) == 9 * sizeof(double), "as kernels.h says");
 
-// Writes h and q. The point is in front of the camera.
+// Writes all but x. The point is in front of the camera.
 inline void linearise(const tv_window_options& options, const LossCurvature& curvature,
                       const WindowObservation& o, LinearObservation* out) {
-  double(*h)[3] = out->h;
-  Residual r{};
-  residual_at(o, out->x, &r);
-  const double s = norm_sq(r);
+  out->residual = {};
+  residual_at(o, out->x, &out->residual);
+  const double s = norm_sq(out->residual);
   const LossSlope loss = slope_of(options, s);
-  TV_UNROLL
-  for (int i = 0; i < 3; ++i) {
-    h[0][i] = (o.J[i] - r.e[0] * o.n[i]) * r.inverse_depth;
-    h[1][i] = (o.J[3 + i] - r.e[1] * o.n[i]) * r.inverse_depth;
-    out->q[i] = loss.weight * (r.e[0] * h[0][i] + r.e[1] * h[1][i]);
-  }
+  out->weight = loss.weight;
+  out->root = 1.0;
+  out->along = 0.0;
   if (loss.weight == 1.0) return;
-  const double root =
-      std::sqrt(curvature.averaged ? loss.weight * (1.0 + 0.5 * loss.bend) : loss.weight);
-  double along[3] = {};
+  out->root = std::sqrt(curvature.averaged ? loss.weight * (1.0 + 0.5 * loss.bend) : loss.weight);
   if (curvature.bend > 0.0) {
     // Along the residual, the curvature is 1 + bend of that across it (B. Triggs et al. 1999, 4.3),
     // as far as this is not negative.
     const double kept = std::sqrt(1.0 + curvature.bend * (loss.bend > -1.0 ? loss.bend : -1.0));
-    const double factor = (1.0 - kept) / s;
-    TV_UNROLL
-    for (int i = 0; i < 3; ++i) along[i] = factor * (r.e[0] * h[0][i] + r.e[1] * h[1][i]);
-  }
-  TV_UNROLL
-  for (int i = 0; i < 3; ++i) {
-    h[0][i] = root * (h[0][i] - r.e[0] * along[i]);
-    h[1][i] = root * (h[1][i] - r.e[1] * along[i]);
+    out->along = (1.0 - kept) / s;
   }
 }
 

@@ -17,7 +17,9 @@ struct WindowPose {
 };
 
 inline void to_camera(const WindowPose& pose, const double X[3], double x[3]) {
-  TV_UNROLL
+#if !defined(__OPTIMIZE_SIZE__)
+#pragma GCC unroll 3  // 7 per cent of an adjustment's time
+#endif
   for (int i = 0; i < 3; ++i) {
     const double* row = pose.R + 3 * i;
     x[i] = ((row[0] * X[0] + row[1] * X[1]) + row[2] * X[2]) + pose.t[i];

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 namespace tv {
 namespace {
@@ -22,38 +23,21 @@ constexpr int kCarefulSteps = 2;
 constexpr int kSettleSteps = 10;
 constexpr double kSettleDamping = 1e-3, kSettled = 0.999;
 
-// The sums over a point's observations: V = sum Jp'Jp (xx xy xz yy yz zz) and half the gradient.
+// The sums over a point's observations, as the kernel add_observation adds them: V = sum Jp'Jp
+// (xx xy xz yy yz zz) and half the gradient.
 struct PointSums {
   double V[6], gradient[3];
 };
 
-// Adds an observation to the point's sums; h: its rows by x, for the view's part.
-void add_to_point(const Window& window, const Weighing& weighing, const WindowPose& pose,
-                  const WindowObservation& o, const double X[3], PointSums* sums,
-                  LinearObservation* part) {
-  double Rq[3];
-  to_camera(pose, X, part->x);
-  linearise(window.options, weighing.curvature, o, part);
-  TV_UNROLL
-  for (int i = 0; i < 2; ++i) rotate_back(pose.R, part->h[i], part->Jp[i]);
-  rotate_back(pose.R, part->q, Rq);
-  TV_UNROLL
-  for (int i = 0, slot = 0; i < 3; ++i) {
-    sums->gradient[i] += Rq[i];
-    TV_UNROLL
-    for (int j = i; j < 3; ++j, ++slot) {
-      sums->V[slot] += part->Jp[0][i] * part->Jp[0][j] + part->Jp[1][i] * part->Jp[1][j];
-    }
-  }
-}
-
-void add_to_slot(const Window& window, const LinearObservation& part, int place) {
-  const int block = window.slot_block[place];
-  const BlockMatrix& A = window.system;
-  double* columns = reinterpret_cast<double*>(window.Z[place].at);
-  A.kernels->add_view_terms(reinterpret_cast<const double*>(&part), block_at(A, block, block),
-                            row_entries(block), window.gradient + kBlock * block,
-                            A.diagonal + kBlock * block, columns);
+// Adds an observation to the point's sums, and to the terms of its view unless `block` is negative.
+void add_observation(const Window& window, const LossCurvature& curvature, const WindowPose& pose,
+                     const WindowObservation& o, const double X[3], PointSums* sums, int block,
+                     double* columns, int pitch) {
+  LinearObservation linear;
+  to_camera(pose, X, linear.x);
+  linearise(window.options, curvature, o, &linear);
+  window.system.kernels->add_observation(o.J, pose.R, linear.x, sums->V, &window.reduced, block,
+                                         columns, pitch);
 }
 
 // The vector from the first view that sees the point to the point.
@@ -167,42 +151,50 @@ void eliminate(const Window& window, const WindowPose* pose, const WindowPoint& 
 }
 
 // Z = L^-1 W' in place of W', and its part of the reduced gradient.
-void reduce_slot(const EliminatedPoint& e, Pair* Z, double* gradient) {
-  Pair* g = reinterpret_cast<Pair*>(gradient);
-  for (int c = 0; c < kBlockPairs; ++c) {
-    const Pair z0 = Z[c] * e.inverses[0];
-    const Pair z1 = (Z[3 + c] - e.l10 * z0) * e.inverses[1];
-    const Pair z2 = ((Z[6 + c] - e.l20 * z0) - e.l21 * z1) * e.inverses[2];
-    Z[c] = z0, Z[3 + c] = z1, Z[6 + c] = z2;
-    g[c] -= (z0 * e.y[0] + z1 * e.y[1]) + z2 * e.y[2];
+void reduce_columns(const Window& window, const EliminatedPoint& of, const WindowPoint& point,
+                    Pair* Z) {
+  const EliminatedPoint e = of;  // stays in registers while Z is written
+  const int pitch = kBlockPairs * point.num_slots;
+  for (int k = 0; k < point.num_slots; ++k) {
+    Pair* g = reinterpret_cast<Pair*>(window.reduced.gradient +
+                                      kBlock * window.slot_block[point.begin + k]);
+    for (int c = 0; c < kBlockPairs; ++c, ++Z, ++g) {
+      const Pair z0 = Z[0] * e.inverses[0];
+      const Pair z1 = (Z[pitch] - e.l10 * z0) * e.inverses[1];
+      const Pair z2 = ((Z[2 * pitch] - e.l20 * z0) - e.l21 * z1) * e.inverses[2];
+      Z[0] = z0, Z[pitch] = z1, Z[2 * pitch] = z2;
+      *g -= (z0 * e.y[0] + z1 * e.y[1]) + z2 * e.y[2];
+    }
   }
 }
 
-double add_point(const Window& window, Weighing weighing, int p) {
+double add_point(const Window& window, const Weighing& weighing, int p) {
   WindowPoint& point = window.points[p];
+  const BlockMatrix& A = window.system;
+  const int32_t* blocks = window.slot_block + point.begin;
   const double* X = window.position + 3 * p;
+  const int pitch = kBlock * point.num_slots;
   PointSums sums{};
-  if (point.careful > 0) weighing.curvature.bend = 0.0;
-  if (point.careful > 0) --point.careful;
+  LossCurvature curvature = weighing.curvature;
+  if (point.careful > 0) {
+    --point.careful;
+    curvature.bend = 0.0;
+  }
   // Long before it is added to: the CPU cannot load a vector that was just stored in parts.
-  Columns* Z = window.Z + point.begin;
-  std::fill_n(reinterpret_cast<double*>(Z), 3 * kBlock * point.num_slots, 0.0);
+  Pair* Z = window.Z + 3 * kBlockPairs * point.begin;
+  double* columns = reinterpret_cast<double*>(Z);
+  std::memset(columns, 0, sizeof(double) * 3 * static_cast<size_t>(pitch));
   for (int k = point.begin; k < point.end; ++k) {
     const WindowObservation& o = window.observations[k];
-    LinearObservation part;
-    add_to_point(window, weighing, window.pose[o.view], o, X, &sums, &part);
-    if (o.slot < 0) continue;
-    add_to_slot(window, part, point.begin + o.slot);
+    add_observation(window, curvature, window.pose[o.view], o, X, &sums, window.block[o.view],
+                    columns + kBlock * o.slot, pitch);
   }
   double ray[3];
   ray_of(window, window.pose, point, X, ray);
   EliminatedPoint& e = window.eliminated[p];
   eliminate(window, window.pose, point, ray, weighing.damping, &sums, &e);
-  const int32_t* blocks = window.slot_block + point.begin;
-  for (int k = 0; k < point.num_slots; ++k) {
-    reduce_slot(e, Z[k].at, window.gradient + kBlock * blocks[k]);
-  }
-  subtract_products(window.system, Z, blocks, point.num_slots);
+  reduce_columns(window, e, point, Z);
+  A.kernels->subtract_products(A.entries, columns, pitch, blocks, point.num_slots);
   return dot(e.y, e.y);
 }
 
@@ -264,7 +256,7 @@ void add_term(const Window& window, double weight, const PriorTerm& term, int lo
     const int row = views[a] < 0 ? -1 : window.block[views[a]];
     if (row < 0) continue;
     for (int i = 0; i < kBlock; ++i) {
-      window.gradient[kBlock * row + i] += weight * term.gradient[a][i];
+      window.reduced.gradient[kBlock * row + i] += weight * term.gradient[a][i];
       window.system.diagonal[kBlock * row + i] += weight * term.H[a][a][kBlock * i + i];
     }
     for (int b = 0; b <= a; ++b) {
@@ -281,10 +273,10 @@ void add_term(const Window& window, double weight, const PriorTerm& term, int lo
 }
 
 double build_system(const Window& window, const Weighing& weighing) {
-  const size_t size = static_cast<size_t>(kBlock * window.num_blocks);
-  std::fill_n(window.system.entries, block_entries(window.num_blocks), 0.0);
-  std::fill(window.system.diagonal, window.system.diagonal + size, 0.0);
-  std::fill(window.gradient, window.gradient + size, 0.0);
+  const size_t bytes = sizeof(double) * static_cast<size_t>(kBlock * window.num_blocks);
+  std::memset(window.reduced.entries, 0, sizeof(double) * block_entries(window.num_blocks));
+  std::memset(window.reduced.diagonal, 0, bytes);
+  std::memset(window.reduced.gradient, 0, bytes);
   visit_priors(window, window.pose, &weighing.prior_weight);
   double sum = 0.0;
   for (int p = 0; p < window.num_points; ++p) sum += add_point(window, weighing, p);
@@ -327,12 +319,11 @@ void joint_step(const Window& window, int p, double next[3], double* damped) {
   const EliminatedPoint& e = window.eliminated[p];
   const double* X = window.position + 3 * p;
   double y[3] = {e.y[0], e.y[1], e.y[2]}, ray[3], step[3];
-  for (int k = 0; k < point.num_slots; ++k) {
-    const int place = point.begin + k;
-    const double* Z = reinterpret_cast<const double*>(window.Z[place].at);
-    const double* of_view = window.step + kBlock * window.slot_block[place];
+  const double* Z = reinterpret_cast<const double*>(window.Z + 3 * kBlockPairs * point.begin);
+  for (int k = 0; k < point.num_slots; ++k, Z += kBlock) {
+    const double* of_view = window.step + kBlock * window.slot_block[point.begin + k];
     for (int m = 0; m < 3; ++m) {
-      const double* z = Z + kBlock * m;
+      const double* z = Z + kBlock * point.num_slots * m;
       y[m] += (z[0] * of_view[0] + z[1] * of_view[1] + z[2] * of_view[2]) +
               (z[3] * of_view[3] + z[4] * of_view[4] + z[5] * of_view[5]);
     }
@@ -351,8 +342,8 @@ bool settle(const Window& window, WindowPoint* point, double X[3], double* sum_s
     PointSums sums{};
     for (int k = point->begin; k < point->end; ++k) {
       const WindowObservation& o = window.observations[k];
-      LinearObservation part;
-      add_to_point(window, {0.0, 0.0, {0.0, false}}, window.next_pose[o.view], o, X, &sums, &part);
+      add_observation(window, {0.0, false}, window.next_pose[o.view], o, X, &sums, kHeldView,
+                      nullptr, 0);
     }
     EliminatedPoint e;
     double ray[3], step[3], next[3], cost, next_sum_sq, damped = 0.0;

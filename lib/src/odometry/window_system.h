@@ -43,10 +43,11 @@ struct Window {
   WindowPose* next_pose = nullptr;
   int32_t* block = nullptr;  // of each view in the reduced system, or one of the values below
   int num_blocks = 0;
-  Columns* Z = nullptr;  // for each observation's place: the point's k-th slot, L^-1 W'
+  Pair* Z = nullptr;  // L^-1 W', 9 for each observation: a point's have three rows of its slots
   EliminatedPoint* eliminated = nullptr;
   BlockMatrix system = {};
-  double* gradient = nullptr;  // half that of the cost, reduced by the points
+  // Of `system`, and half the gradient of the cost, reduced by the points.
+  tvk_reduced_system reduced = {};
   double* step = nullptr;
 };
 

@@ -1,0 +1,57 @@
+/* The kernels of a window's reduced system (odometry/window_system.h, odometry/block_cholesky.h): a
+   list and a table of their own, because only the odometry uses them. What kernels.h says of its
+   kernels holds for these, too. */
+#ifndef TWOVIEW_KERNELS_BLOCKS_H
+#define TWOVIEW_KERNELS_BLOCKS_H
+
+#include <stdint.h>
+
+#include "kernels/kernels.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* The matrix of blocks, the diagonal that it has without the points, and the gradient: 6 entries of
+   these two for each block. */
+typedef struct tvk_reduced_system {
+  double *entries, *diagonal, *gradient;
+} tvk_reduced_system;
+
+/* The contract of each kernel.
+
+   subtract_products: of a symmetric matrix whose lower triangle is stored as in
+   odometry/block_cholesky.h, subtracts Z_a Z_b' from the 6x6 blocks (blocks[a], blocks[b]) for all
+   a and all b <= a, where blocks ascends. Z_a is 6x3; its columns are at columns + 6 a, `pitch`
+   entries apart. The three products are added first, so that each entry changes once.
+
+   add_observation: adds the terms of an observation of a window (odometry/window_observation.h) to
+   those of its point, and, if `block` is not negative, to those of its view. observation: J (2x3,
+   column-major), then n; R: cam_from_world, row-major; linear: the nine numbers of a
+   tv::LinearObservation. The derivatives of the residual e by x are h = (J - e n') / depth; half
+   the gradient by x is q = weight h'e; then h becomes root (h - along e (e'h)), and Jp = h R. sums:
+   the 6 entries of the upper triangle of Jp'Jp, by rows, and the 3 of R'q. With the rows
+   a = (x cross h0, h0) and b = (x cross h1, h1), a'a + b'b is added to the block of the diagonal
+   and its own diagonal to `diagonal`, (x cross q, q) to the gradient, and Jp0i a + Jp1i b to the
+   columns i = 0, 1, 2, which are `pitch` entries apart. */
+#define TVK_BLOCKS_LIST(X)                                                                       \
+  X(subtract_products, void,                                                                     \
+    (double *entries, const double *columns, int32_t pitch, const int32_t *blocks, int32_t num)) \
+  X(add_observation, void,                                                                       \
+    (const double *observation, const double *R, const double *linear, double *sums,             \
+     const tvk_reduced_system *system, int32_t block, double *columns, int32_t pitch))
+
+typedef struct tvk_blocks {
+#define TVK_MEMBER(name, result, parameters) result(*name) parameters;
+  TVK_BLOCKS_LIST(TVK_MEMBER)
+#undef TVK_MEMBER
+} tvk_blocks;
+
+/* Those that belong to a table of kernels.h. */
+const tvk_blocks *tvk_blocks_of(const tvk_table *kernels);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
