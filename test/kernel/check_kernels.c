@@ -1,7 +1,7 @@
 /* Every kernel of every set that this machine runs, against the C set: the same bytes out of random
    and extreme data, odd sizes and misaligned pointers, and nothing written outside the outputs.
    Inputs are heap blocks of the exact size, so the address sanitizer sees a read beyond them.
-   The cases come from TVK_LIST and TVK_BLOCKS_LIST: a kernel without a case does not compile.
+   The cases come from TVK_LIST and TVK_ODOMETRY_LIST: a kernel without a case does not compile.
 
    check_kernels          runs the checks
    check_kernels --time   prints nanoseconds per call of typical size, a column per set */
@@ -14,13 +14,13 @@
 #include <time.h>
 #include <unity.h>
 
-#include "kernels/blocks.h"
+#include "kernels/odometry.h"
 #include "support/random.h"
 #include "twoview/context.h"
 #include "twoview/triangulate.h"
 
 #if defined(TWOVIEW_HAS_ODOMETRY)
-#define ALL_KERNELS(X) TVK_LIST(X) TVK_BLOCKS_LIST(X)
+#define ALL_KERNELS(X) TVK_LIST(X) TVK_ODOMETRY_LIST(X)
 #else
 #define ALL_KERNELS(X) TVK_LIST(X)
 #endif
@@ -710,6 +710,27 @@ static void case_triangulate(trial *t) {
 }
 
 #if defined(TWOVIEW_HAS_ODOMETRY)
+static void case_sighting_costs(trial *t) {
+  const int32_t first = TVK_SIGHTING_BLOCK * pick(t, 0, 2, 0), num = first + TVK_SIGHTING_BLOCK;
+  const float *arrays[12];
+  float *pose = INPUT(t, float, 12);
+  int32_t *out = OUTPUT(t, int32_t, 1), k, n;
+  for (k = 0; k < 12; ++k) {
+    float *numbers = INPUT(t, float, num);
+    /* Points around the origin, rows of J of 500 pixels, axes near z. */
+    const double size = k < 3 ? 1 : k < 9 ? 500 : 0.1;
+    for (n = 0; n < num; ++n) {
+      numbers[n] = (float)(size * (2 * random_unit(&t->seed) - 1) + (k == 11 ? 1 : 0));
+      if (!t->typical && random_int(&t->seed, 0, 99) == 0) numbers[n] = n % 2 ? NAN : 1e30f;
+    }
+    pose[k] = (float)(2 * random_unit(&t->seed) - 1 + (k == 11 ? 2 : 0));
+    arrays[k] = numbers;
+  }
+  /* From thresholds that hardly any match meets to such that nearly all do. */
+  REPEAT(t, *out = tvk_odometry_of(t->set)->sighting_costs(
+                arrays, first, pose, (float)pow(10, -random_int(&t->seed, 2, 6))));
+}
+
 static void case_subtract_products(trial *t) {
   const int32_t num_rows = pick(t, 1, 20, 10), num_entries = 18 * num_rows * (num_rows + 1);
   double *entries = OUTPUT(t, double, num_entries), *columns = INPUT(t, double, 18 * num_rows);
@@ -719,7 +740,8 @@ static void case_subtract_products(trial *t) {
   }
   for (k = 0; k < num_entries; ++k) entries[k] = 2 * random_unit(&t->seed) - 1;
   for (k = 0; k < 18 * num_rows; ++k) columns[k] = 2 * random_unit(&t->seed) - 1;
-  REPEAT(t, tvk_blocks_of(t->set)->subtract_products(entries, columns, 6 * num_rows, blocks, num));
+  REPEAT(t,
+         tvk_odometry_of(t->set)->subtract_products(entries, columns, 6 * num_rows, blocks, num));
 }
 
 static void case_add_observation(trial *t) {
@@ -747,8 +769,8 @@ static void case_add_observation(trial *t) {
   for (k = 0; k < 2 * pitch + 6; ++k) columns[k] = 2 * random_unit(&t->seed) - 1;
   for (k = 0; k < 6 * num_blocks; ++k) gradient[k] = 2 * random_unit(&t->seed) - 1;
   for (k = 0; k < 6 * num_blocks; ++k) diagonal[k] = 2 * random_unit(&t->seed) - 1;
-  REPEAT(t, tvk_blocks_of(t->set)->add_observation(observation, R, linear, sums, &system, idx,
-                                                   columns, pitch));
+  REPEAT(t, tvk_odometry_of(t->set)->add_observation(observation, R, linear, sums, &system, idx,
+                                                     columns, pitch));
 }
 #endif
 

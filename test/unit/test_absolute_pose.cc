@@ -60,8 +60,9 @@ void make(uint64_t seed, const tv_camera& camera, int num, double noise_px, bool
     for (int d = 0; d < 3; ++d) s.points[3 * i + d] = point[d];
     ++i;
   }
-  s.input = tv::SightingInput{
-      prepared, s.pixels, s.points, nullptr, with_sigmas ? s.sigmas : nullptr, num};
+  s.input =
+      tv::SightingInput{tvk_select(TV_KERNELS_AUTO),      prepared, s.pixels, s.points, nullptr,
+                        with_sigmas ? s.sigmas : nullptr, num};
 }
 
 void prepare() {

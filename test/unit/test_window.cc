@@ -155,7 +155,7 @@ Terms terms_of(const tv::WindowObservation& o, const double R[9],
                const tv::LinearObservation& linear) {
   Terms terms{};
   const tvk_reduced_system system = {terms.entries, terms.diagonal, terms.gradient};
-  tvk_blocks_of(tvk_select(TV_KERNELS_AUTO))
+  tvk_odometry_of(tvk_select(TV_KERNELS_AUTO))
       ->add_observation(o.J, R, linear.x, terms.sums, &system, 1, terms.columns[0], 6);
   return terms;
 }
@@ -394,7 +394,7 @@ Eigen::MatrixXd random_matrix(Random* random, int rows, int columns) {
 void expect_solution(const Eigen::MatrixXd& whole, int blocks, Random* random) {
   const int n = 6 * blocks;
   const Eigen::VectorXd b = random_matrix(random, n, 1);
-  const tvk_blocks* kernels = tvk_blocks_of(tvk_select(TV_KERNELS_AUTO));
+  const tvk_odometry_table* kernels = tvk_odometry_of(tvk_select(TV_KERNELS_AUTO));
   tv::Arena measure = tv::measuring_arena();
   tv::block_matrix(blocks, kernels, measure);
   memory.resize(measure.used_bytes + 64);

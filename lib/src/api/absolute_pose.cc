@@ -93,11 +93,9 @@ tv_status tv_estimate_absolute_pose(tv_context* context, const tv_camera* camera
   tv::ArenaScope scope(context->arena);
   tv::Sightings sightings;
   tv::AbsolutePoseSearch search;
-  const tv::SightingInput input{tv::prepare_camera(*camera),
-                                given.pixels,
-                                given.points,
-                                given.ratios,
-                                given.sigmas,
+  const tv::SightingInput input{context->kernels, tv::prepare_camera(*camera),
+                                given.pixels,     given.points,
+                                given.ratios,     given.sigmas,
                                 given.num};
   {
     tv::StageTimer timer(context, TV_STAGE_ESTIMATE);

@@ -373,7 +373,65 @@ static tvk_nearest_shape nearest_groups(const tvk_descriptors *rows, const tvk_d
 }
 
 /* The table for ARMv8.2's dot product uses the NEON set's squared_distances. */
-#if !defined(TVK_NEON_DOT)
+#if defined(TVK_AVX2) || defined(TVK_AVX512)
+#if defined(TVK_AVX512)
+typedef __m512i wide_bytes; /* bytes as 16-bit numbers */
+static inline wide_bytes widen(const uint8_t *p) {
+  return _mm512_cvtepu8_epi16(_mm256_loadu_si256((const __m256i *)p));
+}
+#else
+typedef __m256i wide_bytes;
+static inline wide_bytes widen(const uint8_t *p) {
+  return _mm256_cvtepu8_epi16(_mm_loadu_si128((const __m128i *)p));
+}
+#endif
+enum {
+  WIDE_BYTES = sizeof(wide_bytes) / 2,
+  WIDE_QUERY = TVK_DESCRIPTOR_SIZE / WIDE_BYTES,
+  DISTANCES = 4
+};
+
+/* Eight parts of a squared distance. */
+static inline __m256i parts_of_distance(const wide_bytes query[WIDE_QUERY], const uint8_t *row) {
+  int32_t k;
+#if defined(TVK_AVX512)
+  __m512i sum = _mm512_setzero_si512();
+  for (k = 0; k < WIDE_QUERY; ++k) {
+    const __m512i difference = _mm512_sub_epi16(query[k], widen(row + WIDE_BYTES * k));
+    sum = _mm512_dpwssd_epi32(sum, difference, difference);
+  }
+  return _mm256_add_epi32(_mm512_castsi512_si256(sum), _mm512_extracti64x4_epi64(sum, 1));
+#else
+  __m256i sum = _mm256_setzero_si256();
+  for (k = 0; k < WIDE_QUERY; ++k) {
+    const __m256i difference = _mm256_sub_epi16(query[k], widen(row + WIDE_BYTES * k));
+    sum = _mm256_add_epi32(sum, _mm256_madd_epi16(difference, difference));
+  }
+  return sum;
+#endif
+}
+
+/* The query is widened once, and the parts of four distances are added together. */
+static void squared_distances(const uint8_t *query, const uint8_t *rows, const int32_t *indices,
+                              int32_t count, int32_t *out) {
+  wide_bytes wide[WIDE_QUERY];
+  int32_t k, j, last[DISTANCES];
+  for (k = 0; k < WIDE_QUERY; ++k) wide[k] = widen(query + WIDE_BYTES * k);
+  for (k = 0; k < count; k += DISTANCES) {
+    __m256i parts[DISTANCES], halves;
+    TVK_ROLLED
+    for (j = 0; j < DISTANCES; ++j) { /* the last one again, where there are fewer */
+      const int32_t idx = indices[nearest_min(k + j, count - 1)];
+      parts[j] = parts_of_distance(wide, rows + (int64_t)idx * TVK_DESCRIPTOR_SIZE);
+    }
+    halves = sums_of_halves(parts);
+    _mm_storeu_si128(
+        (__m128i *)(k + DISTANCES > count ? last : out + k),
+        _mm_add_epi32(_mm256_castsi256_si128(halves), _mm256_extracti128_si256(halves, 1)));
+  }
+  if (k > count) memcpy(out + k - DISTANCES, last, sizeof *out * (size_t)(count + DISTANCES - k));
+}
+#elif !defined(TVK_NEON_DOT)
 static inline int32_t squared_distance(const uint8_t *a, const uint8_t *b) {
   int32_t sum = 0, k;
   for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) {

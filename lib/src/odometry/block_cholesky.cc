@@ -57,7 +57,7 @@ bool is_zero(const double* block, int stride) {
 
 }  // namespace
 
-BlockMatrix block_matrix(int num_blocks, const tvk_blocks* kernels, Arena& arena) {
+BlockMatrix block_matrix(int num_blocks, const tvk_odometry_table* kernels, Arena& arena) {
   const size_t blocks = static_cast<size_t>(num_blocks), n = kBlock * blocks;
   BlockMatrix A;
   A.num_blocks = num_blocks;

@@ -7,7 +7,7 @@
 #include <cstdint>
 
 #include "base/arena.h"
-#include "kernels/blocks.h"
+#include "kernels/odometry.h"
 
 namespace tv {
 
@@ -20,7 +20,7 @@ inline constexpr int kBlockPairs = 3;
 
 struct BlockMatrix {
   int num_blocks;
-  const tvk_blocks* kernels;
+  const tvk_odometry_table* kernels;
   double* entries;  // the rows of blocks down to the diagonal, one after the other; 16-byte aligned
   double* inverses;  // of the factor's diagonal, or 0 where a pivot vanished
   double* diagonal;  // of A, which decides when a pivot has vanished
@@ -29,7 +29,7 @@ struct BlockMatrix {
 };
 
 // Uninitialised. A smaller num_blocks may be set afterwards.
-BlockMatrix block_matrix(int num_blocks, const tvk_blocks* kernels, Arena& arena);
+BlockMatrix block_matrix(int num_blocks, const tvk_odometry_table* kernels, Arena& arena);
 
 // How many entries so many rows of blocks have.
 inline size_t block_entries(int num_blocks) {

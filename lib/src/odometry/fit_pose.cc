@@ -50,7 +50,7 @@ bool gather_matches(Odometry* odometry, double max_error_px, const Frame& frame,
     matches->keypoints[num++] = k;
   }
   if (num < 4) return false;
-  matches->input = SightingInput{odometry->camera, pixels, points, nullptr, sigmas, num};
+  matches->input = {odometry->kernels, odometry->camera, pixels, points, nullptr, sigmas, num};
   prepare_sightings(matches->input, arena, &matches->sightings);
   tv_absolute_pose_options_init(&matches->options);
   matches->options.max_error_px = max_error_px;

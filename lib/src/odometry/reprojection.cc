@@ -12,40 +12,8 @@ namespace {
 constexpr double kInfinity = __builtin_inf();
 constexpr double kMostStretch = 1.5;
 
-// Vectors; each operation is the IEEE operation on every lane.
+// Two doubles; each operation is the IEEE operation on both.
 typedef double Doubles __attribute__((vector_size(16)));
-typedef float Floats __attribute__((vector_size(16)));
-typedef int32_t Masks __attribute__((vector_size(16)));
-
-Floats load(const float* p) {
-  Floats x;
-  __builtin_memcpy(&x, p, sizeof x);
-  return x;
-}
-
-// The costs of kSightingBlock matches.
-int32_t block_cost(const Sightings& s, int first, const float m[12], float inverse_sq) {
-  Masks sum = {0, 0, 0, 0};
-  const Floats one = {1, 1, 1, 1};
-  for (int at = first; at < first + kSightingBlock; at += 4) {
-    const Floats x = load(s.fast[0] + at), y = load(s.fast[1] + at), z = load(s.fast[2] + at);
-    const Floats p = ((m[0] * x + m[1] * y) + m[2] * z) + m[9];
-    const Floats q = ((m[3] * x + m[4] * y) + m[5] * z) + m[10];
-    const Floats r = ((m[6] * x + m[7] * y) + m[8] * z) + m[11];
-    const Floats u =
-        (load(s.fast[3] + at) * p + load(s.fast[4] + at) * q) + load(s.fast[5] + at) * r;
-    const Floats v =
-        (load(s.fast[6] + at) * p + load(s.fast[7] + at) * q) + load(s.fast[8] + at) * r;
-    const Floats w =
-        (load(s.fast[9] + at) * p + load(s.fast[10] + at) * q) + load(s.fast[11] + at) * r;
-    const Floats error = (u * u + v * v) * inverse_sq, unit = w * w;
-    const Masks inside = (w > 0.0f) & (error < unit);
-    const Floats ratio = error / unit;
-    const Floats cost = (Floats)(((Masks)ratio & inside) | ((Masks)one & ~inside));
-    sum += __builtin_convertvector(cost * static_cast<float>(kSightingCost), Masks);
-  }
-  return (sum[0] + sum[1]) + (sum[2] + sum[3]);
-}
 
 // The error of a match and its derivatives by the point p = R X + t of the camera's frame.
 struct ErrorRows {
@@ -93,7 +61,7 @@ int64_t reprojection_cost(const Sightings& s, const Pose& pose, double threshold
   // The padding, whose axes are zero, costs as much as wrong matches do.
   int64_t sum = -static_cast<int64_t>(padded - s.num) * kSightingCost;
   for (int done = 0; done < padded;) {
-    sum += block_cost(s, done, m, inverse_sq);
+    sum += s.kernels->sighting_costs(s.fast, done, m, inverse_sq);
     done += kSightingBlock;
     // Gives up where the first matches cost two standard deviations more than the share of `bound`
     // that falls on them; the deviation of one match's cost is taken as 0.4.

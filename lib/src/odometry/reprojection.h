@@ -7,7 +7,7 @@
 
 namespace tv {
 
-inline constexpr int kSightingCost = 65536;  // the cost of a match outside the threshold
+inline constexpr int kSightingCost = TVK_SIGHTING_COST;  // of a match outside the threshold
 
 // Sum over the different matches of min(|e|^2 / T^2, 1), T the threshold, each truncated to a
 // multiple of 1 / kSightingCost: an integer, so that the order does not matter. Where the sum is

@@ -22,13 +22,6 @@ void write_rigid(const Rigid& rigid, double R[9], double t[3]) {
   std::copy_n(rigid.t, 3, t);
 }
 
-void transform(const Rigid& rigid, const double X[3], double x[3]) {
-  const double* R = rigid.R;
-  const double y[3] = {dot(R, X) + rigid.t[0], dot(R + 3, X) + rigid.t[1],
-                       dot(R + 6, X) + rigid.t[2]};
-  for (int k = 0; k < 3; ++k) x[k] = y[k];
-}
-
 Rigid compose(const Rigid& outer, const Rigid& inner) {
   Rigid product;
   for (int r = 0; r < 3; ++r) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "geometry/camera.h"
+#include "geometry/vector3.h"
 
 namespace tv {
 
@@ -16,7 +17,11 @@ inline constexpr Rigid kIdentity = {{1, 0, 0, 0, 1, 0, 0, 0, 1}, {0, 0, 0}};
 Rigid rigid_of(const double R[9], const double t[3]);
 void write_rigid(const Rigid& rigid, double R[9], double t[3]);
 
-void transform(const Rigid& rigid, const double X[3], double x[3]);
+inline void transform(const Rigid& rigid, const double X[3], double x[3]) {
+  const double *R = rigid.R, *t = rigid.t;
+  const double y[3] = {dot(R, X) + t[0], dot(R + 3, X) + t[1], dot(R + 6, X) + t[2]};
+  for (int k = 0; k < 3; ++k) x[k] = y[k];
+}
 Rigid compose(const Rigid& outer, const Rigid& inner);  // x = outer(inner(X))
 Rigid inverse(const Rigid& rigid);
 void centre_of(const Rigid& cam_from_world, double centre[3]);

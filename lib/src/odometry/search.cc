@@ -76,6 +76,16 @@ int32_t find_points(Odometry* odometry, const PointSearch& search, Frame* frame)
   const int32_t columns = odometry->grid_columns;
   double centre[3];
   centre_of(search.cam_from_world, centre);
+  ArenaScope scope(odometry->scratch);
+  // The keypoints' positions in the order of the grid, which are next to each other in memory.
+  struct Position {
+    float x, y;
+  };
+  Position* positions = arena_alloc<Position>(odometry->scratch, static_cast<size_t>(frame->num));
+  for (int32_t n = 0; n < frame->num; ++n) {
+    const tv_keypoint& keypoint = frame->keypoints[frame->cell_items[n]];
+    positions[n] = {keypoint.x, keypoint.y};
+  }
   for (int32_t i = 0; i < search.num; ++i) {
     const int32_t idx = search.points[i];
     MapPoint& point = map.points[idx];
@@ -104,9 +114,9 @@ int32_t find_points(Odometry* odometry, const PointSearch& search, Frame* frame)
       const int32_t begin = frame->cell_starts[cy * columns + x0];
       const int32_t end = frame->cell_starts[cy * columns + x1 + 1];
       for (int32_t n = begin; n < end && num < kMostCandidates; ++n) {
-        const int32_t k = frame->cell_items[n];
-        const float dx = frame->keypoints[k].x - px, dy = frame->keypoints[k].y - py;
-        if (dx * dx + dy * dy <= reach * reach) candidates[num++] = k;
+        const float dx = positions[n].x - px, dy = positions[n].y - py;
+        candidates[num] = frame->cell_items[n];  // stays if it is near, which no branch can foresee
+        num += dx * dx + dy * dy <= reach * reach;
       }
     }
     if (num == 0) continue;
@@ -126,7 +136,8 @@ int32_t find_points(Odometry* odometry, const PointSearch& search, Frame* frame)
       const tv_keypoint& other = frame->keypoints[candidates[n]];
       const float dx = other.x - frame->keypoints[keypoint].x;
       const float dy = other.y - frame->keypoints[keypoint].y;
-      if (dx * dx + dy * dy >= kSameCornerSq) second_sq = std::min(second_sq, distances[n]);
+      const int32_t counted = dx * dx + dy * dy >= kSameCornerSq ? distances[n] : TVK_NEAREST_NONE;
+      second_sq = std::min(second_sq, counted);
     }
     if (distances[best] > kSearchRatio * kSearchRatio * second_sq) continue;
     if (distances[best] >= frame->distances[keypoint]) continue;

@@ -174,6 +174,7 @@ Pose read_pose(const Sightings& s, const double R[9], const double t[3]) {
 
 void prepare_sightings(const SightingInput& in, Arena& arena, Sightings* s) {
   const size_t n = static_cast<size_t>(in.num);
+  s->kernels = tvk_odometry_of(in.kernels);
   s->all = arena_alloc<Sighting>(arena, n);
   s->order = arena_alloc<int32_t>(arena, n);
   const size_t padded = (n + kSightingBlock - 1) / kSightingBlock * kSightingBlock;

@@ -13,11 +13,13 @@
 #include "base/arena.h"
 #include "geometry/camera.h"
 #include "geometry/essential.h"
+#include "kernels/odometry.h"
 
 namespace tv {
 
 // What the caller gave (tv_pixel_points); all that is per match has num entries.
 struct SightingInput {
+  const tvk_table* kernels;
   Camera camera;
   const double *pixels, *points;
   const float *ratios, *sigmas;  // null: no order, 1 for all
@@ -31,15 +33,16 @@ struct Sighting {
   double axis[3];     // a
 };
 
-inline constexpr int kSightingBlock = 32;  // matches that are scored at a time
+inline constexpr int kSightingBlock = TVK_SIGHTING_BLOCK;  // matches that are scored at a time
 
 struct Sightings {
-  Sighting* all = nullptr;  // the different matches, then those that repeat one of them
-  int num = 0, num_all = 0;
-  int32_t* order = nullptr;  // match k is the caller's order[k]
+  const tvk_odometry_table* kernels;
+  Sighting* all;  // the different matches, then those that repeat one of them
+  int num, num_all;
+  int32_t* order;  // match k is the caller's order[k]
   // The different matches once more, for scoring, in single precision and in an order in which the
   // first few, however many, are spread over all: the numbers of a Sighting, one array each.
-  float* fast[12] = {};
+  float* fast[12];
   double centre[3] = {0, 0, 0};  // a point X of the caller is scale (X - centre) here
   double scale = 1;              // a power of two
 };

@@ -30,7 +30,7 @@ size_t count_of(int num) { return static_cast<size_t>(num); }
 double error_sq_at(const Window& window, const WindowObservation& o, const double X[3]) {
   double x[3];
   Residual r{};
-  to_camera(window.pose[o.view], X, x);
+  transform(window.pose[o.view], X, x);
   residual_at(o, x, &r);
   return norm_sq(r);
 }
@@ -316,7 +316,7 @@ struct Gathering {
 };
 
 // The arrays of a window of which every view is adjusted.
-__attribute__((noinline)) Gathering take_arrays(const tvk_blocks* kernels, Arena& arena,
+__attribute__((noinline)) Gathering take_arrays(const tvk_odometry_table* kernels, Arena& arena,
                                                 Window* window) {
   const tv_window& given = window->given;
   const size_t views = count_of(given.num_views), points = count_of(given.num_points);
@@ -346,7 +346,7 @@ __attribute__((noinline)) Gathering take_arrays(const tvk_blocks* kernels, Arena
 
 size_t window_scratch_bytes(const tv_window& given) {
   Arena arena = measuring_arena();
-  Window window{given, {}};
+  Window window(given, {});
   take_arrays(nullptr, arena, &window);
   return arena.used_bytes;
 }
@@ -354,8 +354,8 @@ size_t window_scratch_bytes(const tv_window& given) {
 bool adjust_window(const tv_window& given, const tv_window_options& options,
                    const WindowStart& start, Arena& arena, double* covariances, float* errors_px,
                    tv_window_result* result) {
-  Window window{given, options};
-  const Gathering gathering = take_arrays(tvk_blocks_of(start.kernels), arena, &window);
+  Window window(given, options);
+  const Gathering gathering = take_arrays(tvk_odometry_of(start.kernels), arena, &window);
   for (int v = 0; v < given.num_views; ++v) {
     std::memcpy(window.pose[v].R, given.views[v].R, sizeof window.pose[v].R);
     std::memcpy(window.pose[v].t, given.views[v].t, sizeof window.pose[v].t);

@@ -45,7 +45,7 @@ int append_observations(Window* window, const Camera* cameras, const double* pla
     }
     double x[3];
     Residual r{};
-    to_camera(window->pose[o.view], X, x);
+    transform(window->pose[o.view], X, x);
     if (!residual_at(o, x, &r)) {
       ++result->num_behind;
       continue;

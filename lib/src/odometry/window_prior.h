@@ -4,32 +4,17 @@
 // test/unit/test_window.cc.
 #pragma once
 
-#include "geometry/vector3.h"
-#include "odometry/block_cholesky.h"
+#include "odometry/rigid.h"
 #include "twoview/window.h"
 
 namespace tv {
 
-// cam_from_world, and the camera's centre -R't, in plain arrays: the arena and the loops over
-// observations take them.
-struct WindowPose {
-  double R[9], t[3], centre[3];
+// cam_from_world, and the camera's centre.
+struct WindowPose : Rigid {
+  double centre[3];
 };
 
-inline void to_camera(const WindowPose& pose, const double X[3], double x[3]) {
-#if !defined(__OPTIMIZE_SIZE__)
-#pragma GCC unroll 3  // 7 per cent of an adjustment's time
-#endif
-  for (int i = 0; i < 3; ++i) {
-    const double* row = pose.R + 3 * i;
-    x[i] = ((row[0] * X[0] + row[1] * X[1]) + row[2] * X[2]) + pose.t[i];
-  }
-}
-
-inline void set_centre(WindowPose* pose) {
-  rotate_back(pose->R, pose->t, pose->centre);
-  for (int i = 0; i < 3; ++i) pose->centre[i] = -pose->centre[i];
-}
+inline void set_centre(WindowPose* pose) { centre_of(*pose, pose->centre); }
 
 WindowPose stepped(const WindowPose& pose, const double step[6]);
 

@@ -34,7 +34,7 @@ void add_observation(const Window& window, const LossCurvature& curvature, const
                      const WindowObservation& o, const double X[3], PointSums* sums, int block,
                      double* columns, int pitch) {
   LinearObservation linear;
-  to_camera(pose, X, linear.x);
+  transform(pose, X, linear.x);
   linearise(window.options, curvature, o, &linear);
   window.system.kernels->add_observation(o.J, pose.R, linear.x, sums->V, &window.reduced, block,
                                          columns, pitch);
@@ -237,7 +237,7 @@ bool see_point(const Window& window, const WindowPose* pose, const WindowPoint& 
     const WindowObservation& o = window.observations[k];
     double x[3];
     Residual r{};
-    to_camera(pose[o.view], X, x);
+    transform(pose[o.view], X, x);
     if (!residual_at(o, x, &r)) return false;
     const double s = norm_sq(r);
     squares += s;

@@ -29,26 +29,30 @@ struct WindowPoint {
 
 inline constexpr int32_t kHeldView = -1, kAbsentView = -2;
 
+// The arrays are taken from an arena afterwards.
 struct Window {
+  Window(const tv_window& window, const tv_window_options& its_options)
+      : given(window), options(its_options) {}
+
   const tv_window& given;
   const tv_window_options& options;
   int num_points = 0, num_observations = 0;
-  WindowObservation* observations = nullptr;  // by point, view, and index
-  int32_t* slot_block =
-      nullptr;  // for each observation's place: the block of the point's k-th adjusted view
-  WindowPoint* points = nullptr;
-  double* position = nullptr;  // 3 for each point that takes part
-  double* next_position = nullptr;
-  WindowPose* pose = nullptr;  // of each view
-  WindowPose* next_pose = nullptr;
-  int32_t* block = nullptr;  // of each view in the reduced system, or one of the values below
+  WindowObservation* observations;  // by point, view, and index
+  // For each observation's place: the block of the point's k-th adjusted view.
+  int32_t* slot_block;
+  WindowPoint* points;
+  double* position;  // 3 for each point that takes part
+  double* next_position;
+  WindowPose* pose;  // of each view
+  WindowPose* next_pose;
+  int32_t* block;  // of each view in the reduced system, or one of the values below
   int num_blocks = 0;
-  Pair* Z = nullptr;  // L^-1 W', 9 for each observation: a point's have three rows of its slots
-  EliminatedPoint* eliminated = nullptr;
-  BlockMatrix system = {};
+  Pair* Z;  // L^-1 W', 9 for each observation: a point's have three rows of its slots
+  EliminatedPoint* eliminated;
+  BlockMatrix system;
   // Of `system`, and half the gradient of the cost, reduced by the points.
-  tvk_reduced_system reduced = {};
-  double* step = nullptr;
+  tvk_reduced_system reduced;
+  double* step;
 };
 
 // Gathers the observations, as far as they can be used, by point and view, and counts the others.

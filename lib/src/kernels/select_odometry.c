@@ -1,0 +1,14 @@
+/* Selects the odometry's kernels that belong to a set. */
+#include "kernels/odometry.h"
+#include "twoview/context.h"
+
+extern const tvk_odometry_table tvk_odometry_c, tvk_odometry_avx2;
+
+const tvk_odometry_table *tvk_odometry_of(const tvk_table *kernels) {
+#if defined(__x86_64__)
+  if (kernels->set >= TV_KERNELS_AVX2) return &tvk_odometry_avx2;
+#else
+  (void)kernels;
+#endif
+  return &tvk_odometry_c;
+}
