@@ -156,7 +156,9 @@ Terms terms_of(const tv::WindowObservation& o, const double R[9],
   Terms terms{};
   const tvk_reduced_system system = {terms.entries, terms.diagonal, terms.gradient};
   tvk_odometry_of(tvk_select(TV_KERNELS_AUTO))
-      ->add_observation(o.J, R, linear.x, terms.sums, &system, 1, terms.columns[0], 6);
+      ->add_observation(reinterpret_cast<const double*>(&o), R,
+                        reinterpret_cast<const double*>(&linear), terms.sums, &system, 1,
+                        terms.columns[0], 6);
   return terms;
 }
 

@@ -13,7 +13,7 @@ namespace tv {
 
 // The residual of a point x in the frame of the camera is J x / (n'x), in units of sigma: J is the
 // derivative of the projection at the pixel's own ray, so J ray = 0. A point is in front if n'x >
-// 0.
+// 0. J and n come first, as the kernel add_observation takes them.
 struct WindowObservation {
   double J[6];  // 2x3, column-major
   double n[3];  // (0, 0, 1); for Kannala-Brandt the unit ray
@@ -68,14 +68,15 @@ struct LossCurvature {
   bool averaged;  // instead: all of it, as its mean over all directions
 };
 
-// What the kernel add_observation takes of an observation, which is linear there: h, its
-// derivatives by x, become root (h - along e (e'h)), of which the squares are half its Hessian.
+// What the kernel add_observation takes of an observation, as nine numbers, where it is linearised:
+// h, its derivatives by x, become root (h - along e (e'h)), of which the squares are half its
+// Hessian.
 struct LinearObservation {
   double x[3];  // the point in the frame of the camera: given
   Residual residual;
   double weight, root, along;
 };
-static_assert(sizeof(LinearObservation) == 9 * sizeof(double), "as kernels.h says");
+static_assert(sizeof(LinearObservation) == 9 * sizeof(double), "as kernels/odometry.h says");
 
 // Writes all but x. The point is in front of the camera.
 inline void linearise(const tv_window_options& options, const LossCurvature& curvature,

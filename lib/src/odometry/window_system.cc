@@ -36,8 +36,9 @@ void add_observation(const Window& window, const LossCurvature& curvature, const
   LinearObservation linear;
   transform(pose, X, linear.x);
   linearise(window.options, curvature, o, &linear);
-  window.system.kernels->add_observation(o.J, pose.R, linear.x, sums->V, &window.reduced, block,
-                                         columns, pitch);
+  window.system.kernels->add_observation(
+      reinterpret_cast<const double*>(&o), pose.R, reinterpret_cast<const double*>(&linear),
+      reinterpret_cast<double*>(sums), &window.reduced, block, columns, pitch);
 }
 
 // The vector from the first view that sees the point to the point.
