@@ -26,7 +26,8 @@ static TVK_INLINE block_pair totals_of(block_pair a, block_pair b) {
 #endif
 }
 
-/* Nothing is subtracted, which compilers leave out; + 0 would make -0 to 0. */
+/* lanes_of(x), but -0 stays -0: compilers leave this subtraction out, and so load x into all lanes
+   at once, where lanes_of has to add. */
 static TVK_INLINE lanes all_lanes(double x) { return x - (lanes){0}; }
 #if TVK_LANES > 2
 static TVK_INLINE block_pair low(lanes a) { return (block_pair){a[0], a[1]}; }

@@ -372,7 +372,6 @@ static tvk_nearest_shape nearest_groups(const tvk_descriptors *rows, const tvk_d
   return shape;
 }
 
-/* The table for ARMv8.2's dot product uses the NEON set's squared_distances. */
 #if defined(TVK_AVX2) || defined(TVK_AVX512)
 #if defined(TVK_AVX512)
 typedef __m512i wide_bytes; /* bytes as 16-bit numbers */
@@ -431,7 +430,7 @@ static void squared_distances(const uint8_t *query, const uint8_t *rows, const i
   }
   if (k > count) memcpy(out + k - DISTANCES, last, sizeof *out * (size_t)(count + DISTANCES - k));
 }
-#elif !defined(TVK_NEON_DOT)
+#elif !defined(TVK_NEON_DOT) /* its table uses the NEON set's squared_distances */
 static inline int32_t squared_distance(const uint8_t *a, const uint8_t *b) {
   int32_t sum = 0, k;
   for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) {
