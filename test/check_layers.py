@@ -19,8 +19,9 @@ LAYERS = {
     "robust": {"geometry", "kernels", "base"},
     "odometry": {"match", "robust", "feature", "image", "geometry", "kernels", "base"},
     "dense": {"geometry", "kernels", "base"},
-    "api": {"dense", "odometry", "match", "robust", "feature", "image", "geometry", "kernels",
-            "base"},
+    "room": {"geometry", "base"},
+    "api": {"room", "dense", "odometry", "match", "robust", "feature", "image", "geometry",
+            "kernels", "base"},
 }
 WITHOUT_EIGEN = {"base", "kernels", "image", "feature", "match"}
 WITHOUT_PIXELS = {"geometry", "robust"}

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Checks that a program with the static library carries only the parts that it calls: of a program
-that calls no odometry and no dense cloud, no member of the archive that the linker took is one of
+that calls no odometry, dense cloud or room, no member of the archive that the linker took is one of
 these parts.
 usage: check_static.py --ar AR ARCHIVE MAP OBJECT...   MAP is the linker's map of the program, and
 each OBJECT an object file of such a part"""
@@ -28,9 +28,9 @@ def main():
         sys.exit(f"{args.map}: the linker's map, or {args.archive}, is not understood")
     carried = sorted(taken & parts)
     if carried:
-        sys.exit(f"a program without odometry and dense cloud carries {', '.join(carried)}")
-    print(f"{len(taken)} of {len(members)} members, none of the {len(parts)} of odometry and dense "
-          "cloud")
+        sys.exit(f"a program without odometry, dense cloud and room carries {', '.join(carried)}")
+    print(f"{len(taken)} of {len(members)} members, none of the {len(parts)} of odometry, dense "
+          "cloud and room")
 
 
 if __name__ == "__main__":

@@ -279,6 +279,40 @@ class tv_dense_point(Structure):
                 ("sigma", c_float), ("similarity", c_float), ("grey", c_int32)]
 
 
+class tv_room_options(Structure):
+    _fields_ = [("struct_size", c_uint32), ("truncation_voxels", c_int32), ("voxel", c_double),
+                ("max_distance", c_double)]
+
+
+class tv_depth_map(Structure):
+    _fields_ = [("struct_size", c_uint32), ("width", c_int32), ("height", c_int32),
+                ("stride", c_int32), ("distance", c_void_p), ("sigma", c_void_p),
+                ("witnesses", c_void_p), ("pixels", c_void_p), ("pixel_stride_bytes", c_int64),
+                ("channels", c_int32), ("inferred", c_int32)]
+
+
+class tv_room_state(Structure):
+    _fields_ = [("struct_size", c_uint32), ("num_maps", c_int32), ("num_blocks", c_int32),
+                ("cap_blocks", c_int32), ("voxel", c_double), ("min", c_double * 3),
+                ("max", c_double * 3)]
+
+
+class tv_room_vertex(Structure):
+    _fields_ = [("position", c_float * 3), ("normal", c_float * 3), ("sigma", c_float),
+                ("rgb", c_uint8 * 3), ("inferred", c_uint8), ("num_maps", c_int32),
+                ("reserved", c_int32)]
+
+
+class tv_room_triangle(Structure):
+    _fields_ = [("idx_vertex", c_int32 * 3)]
+
+
+class tv_room_mesh_options(Structure):
+    _fields_ = [("struct_size", c_uint32), ("min_maps", c_int32),
+                ("min_piece_triangles", c_int32), ("measured_only", c_int32),
+                ("min", c_double * 3), ("max", c_double * 3)]
+
+
 STRUCTS = [tv_limits, tv_image, tv_camera, tv_keypoint, tv_features, tv_feature_options,
            tv_correspondence, tv_match_options, tv_guided_options, tv_pixel_pairs,
            tv_estimate_options, tv_two_view, tv_point, tv_view, tv_reconstruct_options,
@@ -286,12 +320,14 @@ STRUCTS = [tv_limits, tv_image, tv_camera, tv_keypoint, tv_features, tv_feature_
            tv_absolute_pose_options, tv_absolute_pose, tv_window_view, tv_observation,
            tv_pose_prior, tv_gravity_prior, tv_distance_prior, tv_window, tv_window_options,
            tv_window_result, tv_odometry_options, tv_odometry_frame, tv_odometry_state,
-           tv_keyframe, tv_map_point, tv_map_observation, tv_dense_options, tv_dense_point]
+           tv_keyframe, tv_map_point, tv_map_observation, tv_dense_options, tv_dense_point, tv_room_options, tv_depth_map,
+           tv_room_state, tv_room_vertex, tv_room_triangle, tv_room_mesh_options]
 
 KEYPOINT = np.dtype(tv_keypoint)
 CORRESPONDENCE = np.dtype(tv_correspondence)
 POINT = np.dtype(tv_point)
 DENSE_POINT = np.dtype(tv_dense_point)
+ROOM_VERTEX = np.dtype(tv_room_vertex)
 WINDOW_VIEW = np.dtype(tv_window_view)
 OBSERVATION = np.dtype(tv_observation)
 POSE_PRIOR = np.dtype(tv_pose_prior)
@@ -379,7 +415,7 @@ class Library:
         for struct in STRUCTS:
             if struct._fields_[0][0] == "struct_size":
                 init = getattr(self.lib, struct.__name__ + "_init_sized", None)
-                if init is not None:  # a library without odometry or dense clouds lacks some
+                if init is not None:  # a library without odometry, dense clouds or the room lacks some
                     init.restype, init.argtypes = None, [c_void_p, c_size_t]
 
     def function(self, name: str) -> Any:
@@ -387,7 +423,8 @@ class Library:
         try:
             return getattr(self.lib, name)
         except AttributeError:
-            part = "TWOVIEW_DENSE" if "dens" in name else "TWOVIEW_ODOMETRY"
+            part = ("TWOVIEW_DENSE" if "dens" in name else
+                    "TWOVIEW_ROOM" if "room" in name or "depth_map" in name else "TWOVIEW_ODOMETRY")
             raise NotImplementedError(f"{self.path} has no {name}: it was built with {part}=OFF, "
                                       "or is of an older release") from None
 

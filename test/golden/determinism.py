@@ -116,7 +116,7 @@ def build(folder, architecture, compiler, level, keep_footprint):
         options += ["-DCMAKE_C_COMPILER=gcc", "-DCMAKE_CXX_COMPILER=g++"]
     targets = ["golden_digest"]
     if keep_footprint and architecture != "x86-64":
-        targets += ["twoview", "twoview_without_dense",
+        targets += ["twoview", "twoview_without_room", "twoview_without_dense",
                     "twoview_without_odometry"]
         options += ["-DCMAKE_C_COMPILER_LAUNCHER=", "-DCMAKE_CXX_COMPILER_LAUNCHER="]
     configured = there / "configured_with"

@@ -51,6 +51,11 @@ LAYOUT(tv_map_point, 112, covariance, 40);
 LAYOUT(tv_map_observation, 24, reserved, 20);
 LAYOUT(tv_dense_options, 40, max_relative_sigma, 32);
 LAYOUT(tv_dense_point, 40, grey, 36);
+LAYOUT(tv_room_options, 24, max_distance, 16);
+LAYOUT(tv_room_state, 72, max, 48);
+LAYOUT(tv_room_vertex, 40, reserved, 36);
+LAYOUT(tv_room_triangle, 12, idx_vertex, 0);
+LAYOUT(tv_room_mesh_options, 64, max, 40);
 
 enum { MAX_KEYPOINTS = 600, NUM_METHODS = TV_TRIANGULATION_MIDPOINT + 1 };
 

@@ -12,6 +12,7 @@
 #include "twoview/match.h"
 #include "twoview/odometry.h"
 #include "twoview/reconstruct.h"
+#include "twoview/room.h"
 #include "twoview/status.h"
 #include "twoview/triangulate.h"
 #include "twoview/two_view.h"

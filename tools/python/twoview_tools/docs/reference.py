@@ -16,6 +16,7 @@ LIBRARY = [
     "two_view",
     "triangulate",
     "dense",
+    "room",
     "bundle",
     "absolute_pose",
     "window",

@@ -1,0 +1,223 @@
+/* twoview: a room, fused from depth maps into a surface, in the caller's memory.
+
+   Space is divided into voxels, which exist in blocks of 4 x 4 x 4 near the surface only. A voxel
+   holds integer sums over the depth maps that saw it: of its signed distance from the surface,
+   truncated and weighted by the inverse of the variance, of the weights, of the colours, and of how
+   many maps saw the surface near it and how many saw through it. Since the sums are integers, a map
+   is removed as exactly as it was added, and a keyframe that has moved is removed at its old pose
+   and added at the new one. The surface is where the mean distance is 0. Sources: B. Curless, M.
+   Levoy, "A volumetric method for building complex models from range images", SIGGRAPH 1996; M.
+   Niessner et al., "Real-time 3D reconstruction at scale using voxel hashing", TOG 2013; S. F. F.
+   Gibson, "Constrained elastic surface nets", MICCAI 1998. Formulas and tests:
+   docs/algorithms/room.md.
+
+   A library that was built with TWOVIEW_ROOM=OFF has none of these functions: the program does not
+   link. */
+#ifndef TWOVIEW_ROOM_H
+#define TWOVIEW_ROOM_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "twoview/camera.h"
+
+TV_BEGIN_DECLS
+
+/* A room, and the memory that it works in. One thread uses it at a time. */
+typedef struct tv_room tv_room;
+
+/* How many depth maps a room can hold. */
+#define TV_ROOM_MAX_MAPS 2047
+/* The least memory of a room, in bytes. */
+#define TV_ROOM_MIN_BYTES 262144
+/* Memory in bytes that holds a furnished room of 8 x 6 x 3 m with voxels of 3 cm. */
+#define TV_ROOM_DEFAULT_BYTES 67108864
+
+/* Options of a room. Filled by tv_room_options_init. */
+typedef struct tv_room_options {
+  /* The caller's sizeof, set by tv_room_options_init. */
+  uint32_t struct_size;
+  /* How many voxels before and behind the measured surface a map is fused, [2, 8], default 3. More
+     average coarser errors out, take more memory, and make objects that are thinner vanish. */
+  int32_t truncation_voxels;
+  /* The side of a voxel in the unit of the poses, above 0, default 0.03. Memory grows with the
+     inverse of its square. */
+  double voxel;
+  /* Distances above it are not fused, in the unit of the poses; 0 (default): no limit. */
+  double max_distance;
+} tv_room_options;
+
+/* Writes the default options into a struct of struct_size bytes; null is allowed. Programs call
+   tv_room_options_init. */
+TV_API void tv_room_options_init_sized(tv_room_options *options, size_t struct_size);
+/* Writes the default options; null is allowed. */
+#define tv_room_options_init(options) tv_room_options_init_sized((options), sizeof *(options))
+
+/* The distance of what each pixel of an image shows. Filled by tv_depth_map_init with zeros, and
+   then by the caller; its arrays are read during a call only, row by row, `stride` elements apart.
+   The image may be a reduced one: the camera that goes with the map is then the reduced one, too
+   (tv_camera_scale). */
+typedef struct tv_depth_map {
+  /* The caller's sizeof, set by tv_depth_map_init. */
+  uint32_t struct_size;
+  /* Width and height in pixels, [1, 16384]: those of the camera. */
+  int32_t width, height;
+  /* Elements from the start of a row to the start of the next one, in `distance`, `sigma` and
+     `witnesses`; at least `width`. */
+  int32_t stride;
+  /* The distance from the camera's centre along the pixel's ray, in the unit of the poses. Where it
+     is unknown: 0, or any number that is not finite or not above 0. (From a depth z along the
+     optical axis: z over the third component of the pixel's unit ray.) */
+  const float *distance;
+  /* The standard deviation of each distance; null: a hundredth of the distance. A pixel whose sigma
+     is not finite or not above 0 is unknown. */
+  const float *sigma;
+  /* How many other images confirmed each distance; null: 1 for all. Pixels of 0 witnesses are
+     unknown. */
+  const uint8_t *witnesses;
+  /* The image that the map lies on: `channels` bytes a pixel, red green blue or grey; null: none,
+     and the surface stays grey. */
+  const uint8_t *pixels;
+  /* Bytes from the start of a row of `pixels` to the start of the next one. */
+  int64_t pixel_stride_bytes;
+  /* 1 (grey) or 3 (red, green, blue); not read without pixels. */
+  int32_t channels;
+  /* 1: no view measured these distances, they were inferred (tv_room_infer). They make surface only
+     where nothing was measured, and its vertices say so. Else 0. */
+  int32_t inferred;
+} tv_depth_map;
+
+/* Writes zeros, and the size, into a struct of struct_size bytes; null is allowed. Programs call
+   tv_depth_map_init. */
+TV_API void tv_depth_map_init_sized(tv_depth_map *map, size_t struct_size);
+/* Writes zeros, and struct_size; null is allowed. */
+#define tv_depth_map_init(map) tv_depth_map_init_sized((map), sizeof *(map))
+
+/* Makes an empty room in `memory`, which starts at a multiple of TV_CONTEXT_ALIGNMENT, has at least
+   TV_ROOM_MIN_BYTES, and is the room's until the caller uses it for something else; nothing else
+   has to be freed. How many blocks the room can hold follows from size_bytes: 1.1 KB each.
+   options: null means the defaults. *room is in `memory`.
+   Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (an option), TV_ERR_NOT_FINITE (an
+   option), TV_ERR_ALIGNMENT, TV_ERR_MEMORY. */
+TV_API tv_status tv_room_init(const tv_room_options *options, void *memory, size_t size_bytes,
+                              tv_room **room);
+
+/* Fuses a depth map.
+   camera: of the map's width and height (else TV_ERR_CAMERA), any model.
+   R, t: world_from_cam, that is x_world = R x_cam + t. R is a row-major 3x3 rotation to within
+   1e-6.
+   Where the room has no memory left for the blocks that the map needs, TV_ERR_CAPACITY is returned
+   and the room is as it was before; it can go on with a coarser voxel (tv_room_coarsen).
+   The weight of a pixel is 16 (voxel / sigma)^2, rounded, at most 64; pixels of weight 0 are
+   unknown. What lies nearer to the camera than the surface by more than the truncation, and by 3
+   sigma, is seen through: a voxel that many maps see through, against the weight with which others
+   saw a surface there, is free. Maps see through the blocks that exist; blocks that later maps make
+   are not seen through by this one.
+   The result has the same bits on every CPU. Takes at most width x height x truncation steps and a
+   step for each voxel of the room in view; about 10 ms for a map of 320 x 240 and voxels of 3 cm on
+   a desktop core.
+   Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (the map or R), TV_ERR_NOT_FINITE (R or
+   t), TV_ERR_CAMERA, TV_ERR_CAPACITY, TV_ERR_LIMITS (the room holds TV_ROOM_MAX_MAPS maps). */
+TV_API tv_status tv_room_add(tv_room *room, const tv_camera *camera, const double R[9],
+                             const double t[3], const tv_depth_map *map);
+
+/* Removes a map that was added with the same camera, pose and contents: the sums are then those of
+   a room to which it was never added, bit for bit. TV_ERR_ARGUMENT where the room holds no map of
+   these arguments: none was added, it was removed already, or tv_room_coarsen has fixed it. Takes
+   the time of tv_room_add, and returns its statuses except TV_ERR_CAPACITY and TV_ERR_LIMITS. */
+TV_API tv_status tv_room_remove(tv_room *room, const tv_camera *camera, const double R[9],
+                                const double t[3], const tv_depth_map *map);
+
+/* Doubles the voxel, which leaves about three quarters of the memory free. The surface is as it
+   was, but for the coarser voxel. The maps that are in the room stay in it for ever: tv_room_remove
+   does not know them any more. Returns TV_ERR_NULL, TV_ERR_LIMITS (after 16 times). */
+TV_API tv_status tv_room_coarsen(tv_room *room);
+
+/* What is in a room. */
+typedef struct tv_room_state {
+  /* The caller's sizeof, set by tv_room_state_init. */
+  uint32_t struct_size;
+  /* How many maps the room holds, those that tv_room_coarsen fixed included. */
+  int32_t num_maps;
+  /* How many blocks of 4 x 4 x 4 voxels there are, and how many there is memory for. */
+  int32_t num_blocks, cap_blocks;
+  /* The side of a voxel now, in the unit of the poses. */
+  double voxel;
+  /* The box of all blocks, in the world; zeros where there are none. */
+  double min[3], max[3];
+} tv_room_state;
+
+/* Writes zeros, and the size, into a struct of struct_size bytes; null is allowed. Programs call
+   tv_room_state_init. */
+TV_API void tv_room_state_init_sized(tv_room_state *state, size_t struct_size);
+/* Writes zeros, and struct_size; null is allowed. */
+#define tv_room_state_init(state) tv_room_state_init_sized((state), sizeof *(state))
+
+/* Writes what is in a room. Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE. */
+TV_API tv_status tv_room_get_state(const tv_room *room, tv_room_state *state);
+
+/* A vertex of the surface. */
+typedef struct tv_room_vertex {
+  /* Position in the world. */
+  float position[3];
+  /* The unit normal, towards the free side. */
+  float normal[3];
+  /* The standard deviation of the position along the normal, in the unit of the poses, from the
+     sigmas of the maps as if they were independent of each other. */
+  float sigma;
+  /* Red, green, blue: the mean of what the maps' images show there. */
+  uint8_t rgb[3];
+  /* 1: no view measured it, it was inferred; else 0. */
+  uint8_t inferred;
+  /* How many maps saw the surface there. */
+  int32_t num_maps;
+  /* Always 0. */
+  int32_t reserved;
+} tv_room_vertex;
+
+/* A triangle: the indices of its vertices, anticlockwise as seen from the free side. */
+typedef struct tv_room_triangle {
+  int32_t idx_vertex[3];
+} tv_room_triangle;
+
+/* Options of tv_room_mesh. Filled by tv_room_mesh_options_init. */
+typedef struct tv_room_mesh_options {
+  /* The caller's sizeof, set by tv_room_mesh_options_init. */
+  uint32_t struct_size;
+  /* The fewest maps that have seen the surface at a voxel, [1, 255], default 1. */
+  int32_t min_maps;
+  /* Connected pieces of fewer triangles are left out, [0, 2^31), default 64. */
+  int32_t min_piece_triangles;
+  /* 1: only what was measured; 0 (default): what was inferred, too. */
+  int32_t measured_only;
+  /* Only blocks that touch this box of the world make vertices; zeros (default): all. */
+  double min[3], max[3];
+} tv_room_mesh_options;
+
+/* Writes the default options into a struct of struct_size bytes; null is allowed. Programs call
+   tv_room_mesh_options_init. */
+TV_API void tv_room_mesh_options_init_sized(tv_room_mesh_options *options, size_t struct_size);
+/* Writes the default options; null is allowed. */
+#define tv_room_mesh_options_init(options) \
+  tv_room_mesh_options_init_sized((options), sizeof *(options))
+
+/* Computes the surface: a vertex in each cell of eight voxels through which it passes, and two
+   triangles around each edge between two voxels that it crosses. Vertices are not repeated; the
+   mesh is closed except where what lies beside was not seen.
+   options: null means the defaults.
+   vertices, triangles: room for cap_vertices and cap_triangles; they overlap nothing else.
+   *num_vertices, *num_triangles: how many were written. Where that is too little, TV_ERR_CAPACITY
+   is returned, the arrays hold nothing of use, and the counts are those that are enough: calling
+   with capacities of 0 (and null arrays) asks for them.
+   The order is that in which the blocks lie in the room's memory, and the same on every CPU. The
+   room is only read, but for scratch in its memory. Takes a step for each voxel of the room.
+   Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (an option, a capacity below 0),
+   TV_ERR_NOT_FINITE (an option), TV_ERR_CAPACITY, TV_ERR_OVERLAP. */
+TV_API tv_status tv_room_mesh(tv_room *room, const tv_room_mesh_options *options,
+                              tv_room_vertex *vertices, int32_t cap_vertices,
+                              tv_room_triangle *triangles, int32_t cap_triangles,
+                              int32_t *num_vertices, int32_t *num_triangles);
+
+TV_END_DECLS
+
+#endif

@@ -1,0 +1,219 @@
+// The entry points of the room: they validate, and call the stages of lib/src/room.
+#include "twoview/room.h"
+
+#include "api/sized.h"
+#include "api/validate.h"
+#include "api/within.h"
+#include "geometry/essential.h"
+#include "room/coarsen.h"
+#include "room/fuse.h"
+#include "room/mesh.h"
+
+namespace tv {
+namespace {
+
+constexpr int32_t kMaxSide = 16384;
+constexpr int32_t kMaxLevels = 16;
+constexpr tv_room_options kDefaults = {sizeof(tv_room_options), 3, 0.03, 0.0};
+constexpr tv_room_mesh_options kMeshDefaults = {
+    sizeof(tv_room_mesh_options), 1, 64, 0, {0, 0, 0}, {0, 0, 0}};
+
+tv_status read_options(const tv_room_options* given, tv_room_options* options) {
+  *options = kDefaults;
+  const tv_status status = read_sized(given, options);
+  if (status != TV_OK) return status;
+  if (!is_finite(options->voxel) || !is_finite(options->max_distance)) return TV_ERR_NOT_FINITE;
+  // Within these, squares of sizes and counts of voxels are numbers.
+  const bool valid = within(options->truncation_voxels, 2, 8) && options->voxel >= 1e-9 &&
+                     options->voxel <= 1e9 && options->max_distance >= 0;
+  return valid ? TV_OK : TV_ERR_ARGUMENT;
+}
+
+tv_status check_map(const tv_depth_map& map, const tv_camera& camera) {
+  if (map.distance == nullptr) return TV_ERR_NULL;
+  const bool valid = within(map.width, 1, kMaxSide) && within(map.height, 1, kMaxSide) &&
+                     map.stride >= map.width && within(map.inferred, 0, 1);
+  if (!valid) return TV_ERR_ARGUMENT;
+  if (map.pixels != nullptr) {
+    if (map.channels != 1 && map.channels != 3) return TV_ERR_ARGUMENT;
+    const tv_image rows = {map.pixels, map.channels * map.width, map.height,
+                           map.pixel_stride_bytes};
+    tv_camera size = camera;
+    size.width = rows.width, size.height = rows.height;
+    const tv_status status = check_camera_image(size, rows);
+    if (status != TV_OK) return status;
+  }
+  return map.width == camera.width && map.height == camera.height ? TV_OK : TV_ERR_CAMERA;
+}
+
+// Checks what tv_room_add and tv_room_remove are given, and makes the view of it.
+tv_status read_view(const tv_room* room, const tv_camera* camera, const double R[9],
+                    const double t[3], const tv_depth_map* map, RoomView* view) {
+  if (room == nullptr || camera == nullptr || R == nullptr || t == nullptr || map == nullptr) {
+    return TV_ERR_NULL;
+  }
+  view->map = tv_depth_map{};
+  tv_status status = read_sized(map, &view->map);
+  if (status == TV_OK) status = tv_camera_check(camera);
+  if (status == TV_OK) status = check_map(view->map, *camera);
+  if (status != TV_OK) return status;
+  if (!all_finite(R, 9) || !all_finite(t, 3)) return TV_ERR_NOT_FINITE;
+  if (!is_rotation(R)) return TV_ERR_ARGUMENT;
+  view->camera = prepare_camera(*camera);
+  for (int i = 0; i < 9; ++i) view->rotation(i / 3, i % 3) = R[i];
+  for (int i = 0; i < 3; ++i) view->centre[i] = t[i];
+  return TV_OK;
+}
+
+tv_status read_request(const tv_room& room, const tv_room_mesh_options* given,
+                       MeshRequest* request) {
+  tv_room_mesh_options o = kMeshDefaults;
+  const tv_status status = read_sized(given, &o);
+  if (status != TV_OK) return status;
+  if (!all_finite(o.min, 3) || !all_finite(o.max, 3)) return TV_ERR_NOT_FINITE;
+  bool valid =
+      within(o.min_maps, 1, 255) && o.min_piece_triangles >= 0 && within(o.measured_only, 0, 1);
+  *request = {o.min_maps, o.min_piece_triangles, o.measured_only != 0, {}, {}};
+  bool everywhere = true;
+  for (int i = 0; i < 3; ++i) everywhere = everywhere && o.min[i] == 0 && o.max[i] == 0;
+  for (int i = 0; i < 3; ++i) {
+    valid = valid && o.min[i] <= o.max[i];
+    const double block = room.options.voxel * kBlockSide;
+    const auto place = [block](double x) {
+      const double c = x / block;
+      return c > kBlockReach ? kBlockReach : c < -kBlockReach ? -kBlockReach : floor_of(c);
+    };
+    request->from[i] = everywhere ? -kBlockReach : place(o.min[i]);
+    request->to[i] = everywhere ? kBlockReach : place(o.max[i]);
+  }
+  return valid ? TV_OK : TV_ERR_ARGUMENT;
+}
+
+}  // namespace
+}  // namespace tv
+
+void tv_room_options_init_sized(tv_room_options* options, size_t struct_size) {
+  tv::init_sized(options, struct_size, &tv::kDefaults, sizeof tv::kDefaults);
+}
+
+void tv_depth_map_init_sized(tv_depth_map* map, size_t struct_size) {
+  tv::init_zeros(map, struct_size);
+}
+
+void tv_room_state_init_sized(tv_room_state* state, size_t struct_size) {
+  tv::init_zeros(state, struct_size);
+}
+
+void tv_room_mesh_options_init_sized(tv_room_mesh_options* options, size_t struct_size) {
+  tv::init_sized(options, struct_size, &tv::kMeshDefaults, sizeof tv::kMeshDefaults);
+}
+
+tv_status tv_room_init(const tv_room_options* options, void* memory, size_t size_bytes,
+                       tv_room** room) {
+  if (memory == nullptr || room == nullptr) return TV_ERR_NULL;
+  tv_room_options checked;
+  const tv_status status = tv::read_options(options, &checked);
+  if (status != TV_OK) return status;
+  if (reinterpret_cast<uintptr_t>(memory) % TV_CONTEXT_ALIGNMENT != 0) return TV_ERR_ALIGNMENT;
+  if (size_bytes < TV_ROOM_MIN_BYTES) return TV_ERR_MEMORY;
+  *room = tv::make_room(checked, memory, size_bytes);
+  return TV_OK;
+}
+
+tv_status tv_room_add(tv_room* room, const tv_camera* camera, const double R[9], const double t[3],
+                      const tv_depth_map* map) {
+  tv::RoomView view;
+  const tv_status status = tv::read_view(room, camera, R, t, map, &view);
+  if (status != TV_OK) return status;
+  if (room->num_maps == TV_ROOM_MAX_MAPS) return TV_ERR_LIMITS;
+  if (!tv::make_near_blocks(*room, view)) return TV_ERR_CAPACITY;
+  tv::add_view(*room, view);
+  room->records[room->num_records++] = {tv::digest_of(view), room->num_calls, 0};
+  ++room->num_maps;
+  return TV_OK;
+}
+
+tv_status tv_room_remove(tv_room* room, const tv_camera* camera, const double R[9],
+                         const double t[3], const tv_depth_map* map) {
+  tv::RoomView view;
+  const tv_status status = tv::read_view(room, camera, R, t, map, &view);
+  if (status != TV_OK) return status;
+  const uint64_t digest = tv::digest_of(view);
+  // Of equal maps, the one that was added last.
+  int32_t k = room->num_records - 1;
+  while (k >= 0 && room->records[k].digest != digest) --k;
+  if (k < 0) return TV_ERR_ARGUMENT;
+  tv::find_near_blocks(*room, view);
+  tv::subtract_view(*room, view, room->records[k].added_at);
+  --room->num_maps;
+  --room->num_records;
+  for (; k < room->num_records; ++k) room->records[k] = room->records[k + 1];
+  return TV_OK;
+}
+
+tv_status tv_room_coarsen(tv_room* room) {
+  if (room == nullptr) return TV_ERR_NULL;
+  if (room->level == tv::kMaxLevels) return TV_ERR_LIMITS;
+  tv::coarsen(*room);
+  return TV_OK;
+}
+
+tv_status tv_room_get_state(const tv_room* room, tv_room_state* state) {
+  if (room == nullptr || state == nullptr) return TV_ERR_NULL;
+  const tv_status status = tv::check_sized(state);
+  if (status != TV_OK) return status;
+  tv_room_state s = {};
+  s.num_maps = room->num_maps;
+  s.num_blocks = room->num_blocks;
+  s.cap_blocks = room->cap_blocks;
+  s.voxel = room->options.voxel;
+  const double block = s.voxel * tv::kBlockSide;
+  bool first = true;
+  for (int32_t k = 0; k < room->end_blocks; ++k) {
+    if (room->blocks[k].key == 0) continue;
+    const tv::BlockPlace place = tv::place_of(room->blocks[k].key);
+    const int32_t at[3] = {place.x, place.y, place.z};
+    for (int i = 0; i < 3; ++i) {
+      if (first || at[i] * block < s.min[i]) s.min[i] = at[i] * block;
+      if (first || (at[i] + 1) * block > s.max[i]) s.max[i] = (at[i] + 1) * block;
+    }
+    first = false;
+  }
+  tv::write_sized(s, state);
+  return TV_OK;
+}
+
+tv_status tv_room_mesh(tv_room* room, const tv_room_mesh_options* options, tv_room_vertex* vertices,
+                       int32_t cap_vertices, tv_room_triangle* triangles, int32_t cap_triangles,
+                       int32_t* num_vertices, int32_t* num_triangles) {
+  if (room == nullptr || num_vertices == nullptr || num_triangles == nullptr ||
+      (vertices == nullptr && cap_vertices > 0) || (triangles == nullptr && cap_triangles > 0)) {
+    return TV_ERR_NULL;
+  }
+  tv::MeshRequest request;
+  const tv_status status = tv::read_request(*room, options, &request);
+  if (status != TV_OK) return status;
+  if (cap_vertices < 0 || cap_triangles < 0) return TV_ERR_ARGUMENT;
+  const tv::Bytes arrays[6] = {
+      {vertices, static_cast<size_t>(cap_vertices) * sizeof(tv_room_vertex)},
+      {triangles, static_cast<size_t>(cap_triangles) * sizeof(tv_room_triangle)},
+      {num_vertices, sizeof *num_vertices},
+      {num_triangles, sizeof *num_triangles},
+      {room, sizeof *room},
+      {room->records, static_cast<size_t>(reinterpret_cast<const uint8_t*>(
+                                              room->voxels + static_cast<size_t>(room->cap_blocks) *
+                                                                 tv::kBlockVoxels) -
+                                          reinterpret_cast<const uint8_t*>(room->records))}};
+  if (tv::outputs_overlap(arrays, 4, 6)) return TV_ERR_OVERLAP;
+  int64_t most_vertices, most_triangles;
+  tv::count_mesh(*room, request, &most_vertices, &most_triangles);
+  if (most_vertices > INT32_MAX || most_triangles > INT32_MAX) return TV_ERR_LIMITS;
+  *num_vertices = static_cast<int32_t>(most_vertices);
+  *num_triangles = static_cast<int32_t>(most_triangles);
+  if (*num_vertices > cap_vertices || *num_triangles > cap_triangles) return TV_ERR_CAPACITY;
+  tv::MeshOutput output = {vertices, triangles, 0, 0};
+  tv::write_mesh(*room, request, &output);
+  *num_vertices = output.num_vertices;
+  *num_triangles = output.num_triangles;
+  return TV_OK;
+}

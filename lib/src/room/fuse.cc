@@ -1,0 +1,321 @@
+#include "room/fuse.h"
+
+#include <cmath>
+#include <cstring>
+
+namespace tv {
+namespace {
+
+// What a view measured at a pixel. The weight is 0 where it is unknown.
+struct Measured {
+  double distance, sigma;
+  int32_t weight;
+};
+
+// Without sigmas, a hundredth of the distance.
+constexpr double kRelativeSigma = 0.01;
+// The weight of a pixel whose sigma is a voxel. With the largest weight of 64 the smallest sigma
+// that counts is half a voxel: the voxels' own resolution.
+constexpr double kUnitWeight = 16;
+
+struct Fusion {
+  tv_room& room;
+  const RoomView& view;
+  double voxel, truncation, max_distance;
+};
+
+Fusion fusion_of(tv_room& room, const RoomView& view) {
+  const tv_room_options& o = room.options;
+  return {room, view, o.voxel, o.voxel * o.truncation_voxels,
+          o.max_distance > 0 ? o.max_distance : 1e30};
+}
+
+Measured measured_at(const Fusion& f, int32_t x, int32_t y) {
+  const tv_depth_map& map = f.view.map;
+  const ptrdiff_t at = static_cast<ptrdiff_t>(y) * map.stride + x;
+  const Measured unknown = {0, 0, 0};
+  if (map.witnesses != nullptr && map.witnesses[at] == 0) return unknown;
+  const double distance = static_cast<double>(map.distance[at]);
+  if (!(distance > 0 && distance <= f.max_distance)) return unknown;
+  const double sigma =
+      map.sigma != nullptr ? static_cast<double>(map.sigma[at]) : kRelativeSigma * distance;
+  if (!(sigma > 0)) return unknown;
+  const double ratio = f.voxel / sigma;
+  const double weight = kUnitWeight * (ratio * ratio) + 0.5;
+  return {distance, sigma, weight < kMaxWeight ? static_cast<int32_t>(weight) : kMaxWeight};
+}
+
+// The distance at a pixel (u, v), nearest to (x, y): interpolated, where the four pixels around it
+// are known and lie on one surface.
+double distance_near(const Fusion& f, double u, double v, const Measured& nearest) {
+  const tv_depth_map& map = f.view.map;
+  const int32_t x = floor_of(u), y = floor_of(v);
+  if (x < 0 || y < 0 || x + 1 >= map.width || y + 1 >= map.height) return nearest.distance;
+  const double a = u - x, b = v - y;
+  double sum = 0;
+  for (int k = 0; k < 4; ++k) {
+    const Measured m = measured_at(f, x + (k & 1), y + (k >> 1));
+    const double step = m.distance - nearest.distance;
+    if (m.weight == 0 || step > f.truncation || -step > f.truncation) return nearest.distance;
+    sum += m.distance * ((k & 1) != 0 ? a : 1 - a) * ((k >> 1) != 0 ? b : 1 - b);
+  }
+  return sum;
+}
+
+// Red, green and blue, at a pixel, packed as a voxel's sums.
+uint64_t colour_at(const tv_depth_map& map, int32_t x, int32_t y) {
+  int64_t rgb[3] = {128, 128, 128};
+  if (map.pixels != nullptr) {
+    const uint8_t* p = map.pixels + y * map.pixel_stride_bytes + map.channels * x;
+    for (int k = 0; k < 3; ++k) rgb[k] = p[map.channels == 3 ? k : 0];
+  }
+  return pack_colour(rgb);
+}
+
+// The pixel of a point; false where it lies outside the map.
+bool pixel_of(const RoomView& view, const Vec3& point, double* u, double* v) {
+  Vec2 pixel;
+  if (view.camera.model.model == TV_CAMERA_PINHOLE) {
+    if (!(point[2] > 0)) return false;
+    const double inverse = 1 / point[2];
+    *u = view.camera.model.fx * (point[0] * inverse) + view.camera.model.cx;
+    *v = view.camera.model.fy * (point[1] * inverse) + view.camera.model.cy;
+  } else {
+    if (!project(view.camera, point, &pixel, nullptr)) return false;
+    *u = pixel[0];
+    *v = pixel[1];
+  }
+  return *u >= -0.5 && *v >= -0.5 && *u < view.map.width - 0.5 && *v < view.map.height - 0.5;
+}
+
+// What the view contributes to a voxel at a point of its camera's frame; false where that is
+// nothing. near: the voxel may be near the surface; else only seeing through it counts.
+bool contribution(const Fusion& f, const Vec3& point, bool near, Voxel* added) {
+  double u, v;
+  if (!pixel_of(f.view, point, &u, &v)) return false;
+  const int32_t x = floor_of(u + 0.5), y = floor_of(v + 0.5);
+  const Measured m = measured_at(f, x, y);
+  if (m.weight == 0) return false;
+  const double range = std::sqrt((point[0] * point[0] + point[1] * point[1]) + point[2] * point[2]);
+  const double in_front = m.distance - range;
+  if (in_front > f.truncation) {
+    *added = {kSeenThrough, 0};
+    return f.view.map.inferred == 0 && in_front > 3 * m.sigma;
+  }
+  if (!near) return false;
+  const double distance = distance_near(f, u, v, m) - range;
+  if (!(distance <= f.truncation && distance >= -f.truncation)) return false;
+  const double share = distance / f.truncation;
+  const int32_t steps = floor_of(share * kMaxDistance + 0.5);
+  // The weight falls from a third of the truncation behind the surface on: what lies there may be
+  // the other side of a thin wall.
+  const double fade = share < -1.0 / 3 ? 1.5 * (1 + share) : 1;
+  const int32_t faded = static_cast<int32_t>(fade * m.weight + 0.5);
+  const int32_t weight = faded > 0 ? faded : 1;
+  *added = {pack_evidence(int64_t{steps} * weight, weight, 1, 0), colour_at(f.view.map, x, y)};
+  return true;
+}
+
+// Adds the view to a block, sign 1, or subtracts it, sign -1.
+void fuse_block(const Fusion& f, int32_t index, bool near, bool with_free, bool subtract) {
+  const BlockPlace place = place_of(f.room.blocks[index].key);
+  const Mat3& R = f.view.rotation;
+  const double side = f.voxel * kBlockSide, half = 0.5 * f.voxel;  // a voxel is its centre
+  const double from[3] = {place.x * side + half - f.view.centre[0],
+                          place.y * side + half - f.view.centre[1],
+                          place.z * side + half - f.view.centre[2]};
+  Vec3 corner, axis[3];
+  for (int i = 0; i < 3; ++i) {
+    corner[i] = (R(0, i) * from[0] + R(1, i) * from[1]) + R(2, i) * from[2];
+    for (int k = 0; k < 3; ++k) axis[k][i] = R(k, i) * f.voxel;
+  }
+  Voxel* voxel = voxels_of(f.room, index);
+  for (int z = 0; z < kBlockSide; ++z) {
+    for (int y = 0; y < kBlockSide; ++y) {
+      for (int x = 0; x < kBlockSide; ++x, ++voxel) {
+        Vec3 point;
+        for (int i = 0; i < 3; ++i) {
+          point[i] = corner[i] + ((x * axis[0][i] + y * axis[1][i]) + z * axis[2][i]);
+        }
+        Voxel added;
+        if (!contribution(f, point, near, &added)) continue;
+        if (added.evidence == kSeenThrough && !with_free) continue;
+        voxel->evidence += subtract ? ~added.evidence + 1 : added.evidence;
+        voxel->colour += subtract ? ~added.colour + 1 : added.colour;
+      }
+    }
+  }
+}
+
+// Whether the view may see something of a block through which it could see.
+bool may_see(const Fusion& f, int32_t index) {
+  const BlockPlace place = place_of(f.room.blocks[index].key);
+  const double side = f.voxel * kBlockSide, half = 0.5 * side;
+  const double from[3] = {place.x * side + half - f.view.centre[0],
+                          place.y * side + half - f.view.centre[1],
+                          place.z * side + half - f.view.centre[2]};
+  const Mat3& R = f.view.rotation;
+  Vec3 point;
+  for (int i = 0; i < 3; ++i)
+    point[i] = (R(0, i) * from[0] + R(1, i) * from[1]) + R(2, i) * from[2];
+  double u, v;
+  return pixel_of(f.view, point, &u, &v);
+}
+
+// Calls visit(key) for the blocks within the truncation of each measured point: of one pixel in
+// each square of `step` pixels. Stops where it returns false, and returns false then.
+template <typename Visit>
+bool visit_near(const Fusion& f, const Visit& visit) {
+  const tv_depth_map& map = f.view.map;
+  const double block = f.voxel * kBlockSide;
+  double farthest = 0;
+  for (int32_t y = 0; y < map.height; ++y) {
+    for (int32_t x = 0; x < map.width; ++x) {
+      const Measured m = measured_at(f, x, y);
+      if (m.weight > 0 && m.distance > farthest) farthest = m.distance;
+    }
+  }
+  // Squares that are at most half a block large where the surface is farthest.
+  const tv_camera& lens = f.view.camera.model;
+  const double pixel = farthest / (lens.fx < lens.fy ? lens.fx : lens.fy);
+  const int32_t step = 8 * pixel < block ? 4 : 4 * pixel < block ? 2 : 1;
+  uint64_t last = 0;
+  for (int32_t y = 0; y < map.height; y += step) {
+    for (int32_t x = 0; x < map.width; x += step) {
+      int32_t k = 0;
+      Measured m = {0, 0, 0};
+      for (; k < step * step; ++k) {
+        const int32_t px = x + k % step, py = y + k / step;
+        if (px < map.width && py < map.height) m = measured_at(f, px, py);
+        if (m.weight > 0) break;
+      }
+      Vec3 ray;
+      if (m.weight == 0 ||
+          !unproject(f.view.camera, Vec2(x + k % step, y + k / step), &ray, nullptr)) {
+        continue;
+      }
+      const double d[3] = {ray[0], ray[1], ray[2]};
+      double direction[3];
+      for (int i = 0; i < 3; ++i) {
+        const Mat3& R = f.view.rotation;
+        direction[i] = ((R(i, 0) * d[0] + R(i, 1) * d[1]) + R(i, 2) * d[2]);
+      }
+      const int32_t samples = f.room.options.truncation_voxels + 1;  // two voxels apart
+      for (int32_t s = 0; s < samples; ++s) {
+        const double range = m.distance + f.truncation * (2.0 * s / (samples - 1) - 1);
+        int32_t place[3];
+        bool inside = range > 0;
+        for (int i = 0; i < 3; ++i) {
+          const double c = (f.view.centre[i] + range * direction[i]) / block;
+          inside = inside && c >= -kBlockReach + 1 && c < kBlockReach - 1;
+          place[i] = inside ? floor_of(c) : 0;
+        }
+        if (!inside) continue;
+        const uint64_t key =
+            block_key(f.room, {place[0], place[1], place[2], f.view.map.inferred != 0});
+        if (key != last && !visit(key)) return false;
+        last = key;
+      }
+    }
+  }
+  return true;
+}
+
+void fuse(const Fusion& f, uint32_t added_at, bool subtract) {
+  tv_room& room = f.room;
+  const bool sees_through = f.view.map.inferred == 0;
+  for (int32_t k = 0; k < room.num_near; ++k) {
+    const int32_t index = room.near[k];
+    fuse_block(f, index, true, room.blocks[index].born_at <= added_at, subtract);
+  }
+  for (int32_t index = 0; sees_through && index < room.end_blocks; ++index) {
+    const Block& block = room.blocks[index];
+    if (block.key == 0 || block.used_at == room.num_calls || block.born_at > added_at) continue;
+    if (may_see(f, index)) fuse_block(f, index, false, true, subtract);
+  }
+  for (int32_t k = 0; k < room.num_near; ++k) {
+    if (is_void(room, room.near[k])) free_block(room, room.near[k]);
+  }
+}
+
+uint64_t mix(uint64_t digest, uint64_t word) {
+  digest = (digest ^ word) * 0x9e3779b97f4a7c15u;
+  return digest ^ digest >> 29;
+}
+
+uint64_t digest_bytes(uint64_t digest, const void* bytes, size_t count) {
+  const uint8_t* b = static_cast<const uint8_t*>(bytes);
+  for (; count > 0;) {
+    const size_t part = count < 8 ? count : 8;
+    uint64_t word = part;
+    std::memcpy(&word, b, part);
+    digest = mix(digest, word);
+    b += part, count -= part;
+  }
+  return digest;
+}
+
+uint64_t digest_rows(uint64_t digest, const void* data, size_t row_bytes, int64_t stride_bytes,
+                     int32_t rows) {
+  for (int32_t y = 0; data != nullptr && y < rows; ++y) {
+    digest = digest_bytes(digest, static_cast<const uint8_t*>(data) + y * stride_bytes, row_bytes);
+  }
+  return mix(digest, data != nullptr);
+}
+
+}  // namespace
+
+uint64_t digest_of(const RoomView& view) {
+  const tv_depth_map& map = view.map;
+  const size_t width = static_cast<size_t>(map.width);
+  uint64_t digest = mix(0x7477, static_cast<uint64_t>(map.inferred));
+  digest = digest_bytes(digest, &view.camera.model, sizeof view.camera.model);
+  digest = digest_bytes(digest, view.rotation.data(), 9 * sizeof(double));
+  digest = digest_bytes(digest, view.centre.data(), 3 * sizeof(double));
+  digest = digest_rows(digest, map.distance, 4 * width, int64_t{4} * map.stride, map.height);
+  digest = digest_rows(digest, map.sigma, 4 * width, int64_t{4} * map.stride, map.height);
+  digest = digest_rows(digest, map.witnesses, width, map.stride, map.height);
+  const size_t channels = map.pixels != nullptr ? static_cast<size_t>(map.channels) : 0;
+  return digest_rows(digest, map.pixels, width * channels, map.pixel_stride_bytes, map.height);
+}
+
+bool make_near_blocks(tv_room& room, const RoomView& view) {
+  ++room.num_calls;
+  room.num_near = 0;
+  const bool made = visit_near(fusion_of(room, view), [&room](uint64_t key) {
+    int32_t index = find_block(room, key);
+    if (index < 0) index = make_block(room, key);
+    if (index < 0) return false;
+    Block& block = room.blocks[index];
+    if (block.used_at != room.num_calls) room.near[room.num_near++] = index;
+    block.used_at = room.num_calls;
+    return true;
+  });
+  for (int32_t k = 0; !made && k < room.num_near; ++k) {
+    if (room.blocks[room.near[k]].born_at == room.num_calls) free_block(room, room.near[k]);
+  }
+  return made;
+}
+
+void find_near_blocks(tv_room& room, const RoomView& view) {
+  ++room.num_calls;
+  room.num_near = 0;
+  visit_near(fusion_of(room, view), [&room](uint64_t key) {
+    const int32_t index = find_block(room, key);
+    if (index < 0) return true;
+    Block& block = room.blocks[index];
+    if (block.used_at != room.num_calls) room.near[room.num_near++] = index;
+    block.used_at = room.num_calls;
+    return true;
+  });
+}
+
+void add_view(tv_room& room, const RoomView& view) {
+  fuse(fusion_of(room, view), room.num_calls, false);
+}
+
+void subtract_view(tv_room& room, const RoomView& view, uint32_t added_at) {
+  fuse(fusion_of(room, view), added_at, true);
+}
+
+}  // namespace tv

@@ -1,0 +1,32 @@
+// Adding a depth map to a room's sums, and subtracting it. docs/algorithms/room.md.
+#pragma once
+
+#include "geometry/camera.h"
+#include "room/blocks.h"
+
+namespace tv {
+
+// A depth map with its lens and its pose, world_from_cam.
+struct RoomView {
+  Camera camera;
+  Mat3 rotation;
+  Vec3 centre;
+  tv_depth_map map;
+};
+
+// A number that tells views apart by their contents.
+uint64_t digest_of(const RoomView& view);
+
+// Makes the blocks near the view's surface that the room lacks, and lists all of them in room.near.
+// Returns false, and leaves the room as it was, where there is no memory for them.
+bool make_near_blocks(tv_room& room, const RoomView& view);
+
+// Lists those that exist.
+void find_near_blocks(tv_room& room, const RoomView& view);
+
+// Adds the view's contributions to the blocks of room.near, and to what it sees through in all
+// others; or subtracts them, with what it saw through in those that existed when it was added.
+void add_view(tv_room& room, const RoomView& view);
+void subtract_view(tv_room& room, const RoomView& view, uint32_t added_at);
+
+}  // namespace tv
