@@ -13,7 +13,9 @@ import typing as _typing
 
 from ._abi import (CORRESPONDENCE, DENSE_POINT, DESCRIPTOR_BYTES, DISTANCE_PRIOR,
                    GRAVITY_PRIOR, KEYPOINT,
-                   MAP_OBSERVATION, MAP_POINT, OBSERVATION, POINT, POSE_PRIOR, TV_ERR_ALIGNMENT,
+                   MAP_OBSERVATION, MAP_POINT, OBSERVATION, POINT, POSE_PRIOR,
+                   ROOM_PLANE, ROOM_VERTEX,
+                   TV_ERR_ALIGNMENT,
                    TV_ERR_ARGUMENT,
                    TV_ERR_CAMERA, TV_ERR_CAPACITY, TV_ERR_KERNELS, TV_ERR_LIMITS, TV_ERR_MAP,
                    TV_ERR_MEMORY,
@@ -27,11 +29,14 @@ from .camera_files import (FILM, PLAIN_FILE, CalibrationSigmas, FormatError, for
 from .context import Context
 from .dense import densify
 from .enums import (CameraModel, Kernels, Kind, Loss, Normalisation, OdometryStatus, Orientation,
-                    PointStatus, Purpose, Reason, ScaleSource, Solver, Stage, Status,
-                    Triangulation, Verdict)
+                    PointStatus, Purpose, Reason, RoomPlaneKind, ScaleSource, Solver,
+                    Stage, Status, Triangulation, Verdict)
 from .odometry import Keyframe, Odometry, OdometryState
 from .options import (AbsolutePoseOptions, BundleOptions, DenseOptions, EstimateOptions,
-                      FeatureOptions, GuidedOptions, MatchOptions, OdometryOptions, WindowOptions)
+                      FeatureOptions, GuidedOptions, MatchOptions, OdometryOptions,
+                      RoomInferOptions, RoomMeshOptions,
+                      RoomOptions, RoomPlaneOptions, WindowOptions)
+from .room import ROOM_DEFAULT_BYTES, Room, RoomMesh, RoomState
 from .stages import (BundleResult, Reconstruction, TwoView, adjust_two_view, align_matches,
                      correct_matches, corrected_camera, describe, detect, estimate_two_view,
                      extract, keypoint_sigmas, match, match_guided, orient, point_covariances,
@@ -63,7 +68,10 @@ __all__ = [
     "GRAVITY_PRIOR", "GuidedOptions", "KEYPOINT", "Kernels", "Keyframe", "Kind", "Library",
     "Loss", "MAP_OBSERVATION", "MAP_POINT", "MatchOptions", "Normalisation", "OBSERVATION",
     "Odometry", "OdometryOptions", "OdometryState", "OdometryStatus", "Orientation",
-    "PLAIN_FILE", "POINT", "POSE_PRIOR", "PointStatus", "Purpose", "Reason", "Reconstruction",
+    "PLAIN_FILE", "POINT", "POSE_PRIOR", "PointStatus", "Purpose", "ROOM_DEFAULT_BYTES",
+    "ROOM_PLANE", "ROOM_VERTEX", "Reason", "Reconstruction", "Room", "RoomInferOptions",
+    "RoomMesh", "RoomMeshOptions", "RoomOptions", "RoomPlaneKind", "RoomPlaneOptions",
+    "RoomState",
     "ScaleSource", "Solver", "Stage", "Status", "StatusError", "TV_ERR_ALIGNMENT",
     "TV_ERR_ARGUMENT", "TV_ERR_CAMERA", "TV_ERR_CAPACITY", "TV_ERR_KERNELS", "TV_ERR_LIMITS",
     "TV_ERR_MAP", "TV_ERR_MEMORY", "TV_ERR_NOT_FINITE", "TV_ERR_NULL", "TV_ERR_OUTSIDE",

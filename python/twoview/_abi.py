@@ -313,6 +313,20 @@ class tv_room_mesh_options(Structure):
                 ("min", c_double * 3), ("max", c_double * 3)]
 
 
+class tv_room_plane(Structure):
+    _fields_ = [("normal", c_double * 3), ("offset", c_double), ("centre", c_double * 3),
+                ("area", c_double), ("sigma", c_double), ("kind", c_int32), ("reserved", c_int32)]
+
+
+class tv_room_plane_options(Structure):
+    _fields_ = [("struct_size", c_uint32), ("reserved", c_int32), ("min_area", c_double),
+                ("gravity", c_double * 3), ("gravity_sigma_rad", c_double)]
+
+
+class tv_room_infer_options(Structure):
+    _fields_ = [("struct_size", c_uint32), ("max_step", c_int32)]
+
+
 STRUCTS = [tv_limits, tv_image, tv_camera, tv_keypoint, tv_features, tv_feature_options,
            tv_correspondence, tv_match_options, tv_guided_options, tv_pixel_pairs,
            tv_estimate_options, tv_two_view, tv_point, tv_view, tv_reconstruct_options,
@@ -320,14 +334,16 @@ STRUCTS = [tv_limits, tv_image, tv_camera, tv_keypoint, tv_features, tv_feature_
            tv_absolute_pose_options, tv_absolute_pose, tv_window_view, tv_observation,
            tv_pose_prior, tv_gravity_prior, tv_distance_prior, tv_window, tv_window_options,
            tv_window_result, tv_odometry_options, tv_odometry_frame, tv_odometry_state,
-           tv_keyframe, tv_map_point, tv_map_observation, tv_dense_options, tv_dense_point, tv_room_options, tv_depth_map,
-           tv_room_state, tv_room_vertex, tv_room_triangle, tv_room_mesh_options]
+           tv_keyframe, tv_map_point, tv_map_observation, tv_dense_options, tv_dense_point,
+           tv_room_options, tv_depth_map, tv_room_state, tv_room_vertex, tv_room_triangle,
+           tv_room_mesh_options, tv_room_plane, tv_room_plane_options, tv_room_infer_options]
 
 KEYPOINT = np.dtype(tv_keypoint)
 CORRESPONDENCE = np.dtype(tv_correspondence)
 POINT = np.dtype(tv_point)
 DENSE_POINT = np.dtype(tv_dense_point)
 ROOM_VERTEX = np.dtype(tv_room_vertex)
+ROOM_PLANE = np.dtype(tv_room_plane)
 WINDOW_VIEW = np.dtype(tv_window_view)
 OBSERVATION = np.dtype(tv_observation)
 POSE_PRIOR = np.dtype(tv_pose_prior)
@@ -415,7 +431,7 @@ class Library:
         for struct in STRUCTS:
             if struct._fields_[0][0] == "struct_size":
                 init = getattr(self.lib, struct.__name__ + "_init_sized", None)
-                if init is not None:  # a library without odometry, dense clouds or the room lacks some
+                if init is not None:  # a library without a part lacks its structs
                     init.restype, init.argtypes = None, [c_void_p, c_size_t]
 
     def function(self, name: str) -> Any:
@@ -424,7 +440,7 @@ class Library:
             return getattr(self.lib, name)
         except AttributeError:
             part = ("TWOVIEW_DENSE" if "dens" in name else
-                    "TWOVIEW_ROOM" if "room" in name or "depth_map" in name else "TWOVIEW_ODOMETRY")
+                    "TWOVIEW_ROOM" if "room" in name else "TWOVIEW_ODOMETRY")
             raise NotImplementedError(f"{self.path} has no {name}: it was built with {part}=OFF, "
                                       "or is of an older release") from None
 

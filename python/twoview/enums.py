@@ -141,6 +141,12 @@ class ScaleSource(IntEnum):
     HEIGHT_AND_VELOCITY = 3
 
 
+class RoomPlaneKind(IntEnum):
+    OTHER = 0
+    UPRIGHT = 1
+    LEVEL = 2
+
+
 # {enum: the prefix of its values' names in C}.
 C_PREFIXES = {
     Status: "TV_", Kernels: "TV_KERNELS_", Stage: "TV_STAGE_", Purpose: "TV_PURPOSE_",
@@ -149,4 +155,5 @@ C_PREFIXES = {
     Reason: "TV_REASON_",
     Triangulation: "TV_TRIANGULATION_", PointStatus: "TV_POINT_", Loss: "TV_LOSS_",
     OdometryStatus: "TV_ODOMETRY_", ScaleSource: "TV_SCALE_",
+    RoomPlaneKind: "TV_ROOM_PLANE_",
 }

@@ -149,12 +149,52 @@ class DenseOptions:
     max_relative_sigma: float = 0.05  #: largest sigma of a distance, as a share of it
 
 
+@dataclass(frozen=True)
+class RoomOptions:
+    """The options of a Room, as in tv_room_options."""
+
+    truncation_voxels: int = 3  #: voxels before and behind a surface that a map is fused into
+    voxel: float = 0.03  #: its side, in the unit of the poses
+    max_distance: float = 0.0  #: distances above it are not fused; 0: no limit
+
+
+@dataclass(frozen=True)
+class RoomMeshOptions(_Options):
+    """The options of Room.mesh, as in tv_room_mesh_options."""
+
+    min_maps: int = 1  #: fewest maps that have seen the surface at a voxel, [1, 255]
+    min_piece_triangles: int = 64  #: connected pieces of fewer triangles are left out
+    measured_only: bool = False  #: leave out what was inferred
+    min: Sequence[float] = (0.0, 0.0, 0.0)  #: only blocks that touch this box; zeros: all
+    max: Sequence[float] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class RoomPlaneOptions(_Options):
+    """The options of Room.find_planes, as in tv_room_plane_options."""
+
+    reserved: int = 0  #: must be 0
+    min_area: float = 0.0  #: of a plane, in squares of the unit; 0: 640 squares of a voxel's side
+    gravity: Sequence[float] = (0.0, 0.0, 0.0)  #: its direction in the world; zeros: not known
+    gravity_sigma_rad: float = 0.02  #: standard deviation of that direction
+
+
+@dataclass(frozen=True)
+class RoomInferOptions:
+    """The options of Room.infer, as in tv_room_infer_options."""
+
+    max_step: int = 3  #: grey levels between neighbours that count as no texture, [0, 255]
+
+
 _STRUCTS = {FeatureOptions: _abi.tv_feature_options, MatchOptions: _abi.tv_match_options,
             GuidedOptions: _abi.tv_guided_options, EstimateOptions: _abi.tv_estimate_options,
             BundleOptions: _abi.tv_bundle_options,
             AbsolutePoseOptions: _abi.tv_absolute_pose_options,
             WindowOptions: _abi.tv_window_options, OdometryOptions: _abi.tv_odometry_options,
-            DenseOptions: _abi.tv_dense_options}
+            DenseOptions: _abi.tv_dense_options, RoomOptions: _abi.tv_room_options,
+            RoomMeshOptions: _abi.tv_room_mesh_options,
+            RoomPlaneOptions: _abi.tv_room_plane_options,
+            RoomInferOptions: _abi.tv_room_infer_options}
 
 
 def to_struct(library: _abi.Library, kind: type, options: Any, keywords: dict[str, Any]) -> Any:

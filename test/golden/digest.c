@@ -56,6 +56,9 @@ LAYOUT(tv_room_state, 72, max, 48);
 LAYOUT(tv_room_vertex, 40, reserved, 36);
 LAYOUT(tv_room_triangle, 12, idx_vertex, 0);
 LAYOUT(tv_room_mesh_options, 64, max, 40);
+LAYOUT(tv_room_plane, 80, reserved, 76);
+LAYOUT(tv_room_plane_options, 48, gravity_sigma_rad, 40);
+LAYOUT(tv_room_infer_options, 8, max_step, 4);
 
 enum { MAX_KEYPOINTS = 600, NUM_METHODS = TV_TRIANGULATION_MIDPOINT + 1 };
 
@@ -733,6 +736,114 @@ static void digest_dense(const pair *p, tv_context *context, const matched *m,
   print(p, context, "dense");
 }
 
+enum { ROOM_SIDE = 160, ROOM_PIXELS = ROOM_SIDE * ROOM_SIDE };
+
+/* What the pair's camera, reduced, sees in a box from a place within, turned by a quarter around
+   its y axis `turns` times: plain walls with a pattern and distances along their edges alone. */
+typedef struct box_view {
+  tv_depth_map map;
+  double R[9], t[3];
+  float distance[ROOM_PIXELS];
+  uint8_t pixels[ROOM_PIXELS];
+} box_view;
+
+static void see_box(const tv_camera *camera, int turns, box_view *v) {
+  static const double low[3] = {-1.51, -1.02, -1.27}, high[3] = {1.49, 1.03, 1.63};
+  static const double cosines[4] = {1, 0, -1, 0}, sines[4] = {0, 1, 0, -1};
+  const double R[9] = {cosines[turns], 0, sines[turns], 0, 1, 0, -sines[turns], 0, cosines[turns]};
+  const double t[3] = {0.1 * turns - 0.15, 0.05 * turns, 0.07};
+  int32_t k;
+  memcpy(v->R, R, sizeof R);
+  memcpy(v->t, t, sizeof t);
+  tv_depth_map_init(&v->map);
+  v->map.width = v->map.stride = camera->width;
+  v->map.height = camera->height;
+  v->map.distance = v->distance;
+  v->map.pixels = v->pixels;
+  v->map.pixel_stride_bytes = camera->width;
+  v->map.channels = 1;
+  for (k = 0; k < camera->width * camera->height; ++k) {
+    const double pixel[2] = {k % camera->width, k / camera->width};
+    double ray[3], nearest = 1e9, inner = 1e9;
+    int i, wall = 0;
+    v->distance[k] = 0;
+    v->pixels[k] = 0;
+    if (tv_camera_unproject(camera, pixel, ray, NULL) != TV_OK) continue;
+    for (i = 0; i < 3; ++i) {
+      const double d = (R[3 * i] * ray[0] + R[3 * i + 1] * ray[1]) + R[3 * i + 2] * ray[2];
+      const double to = d == 0 ? 1e9 : ((d > 0 ? high[i] : low[i]) - t[i]) / d;
+      if (to < nearest) nearest = to, wall = i;
+    }
+    for (i = 0; i < 3; ++i) {
+      const double d = (R[3 * i] * ray[0] + R[3 * i + 1] * ray[1]) + R[3 * i + 2] * ray[2];
+      const double at = t[i] + nearest * d;
+      if (i != wall && at - low[i] < inner) inner = at - low[i];
+      if (i != wall && high[i] - at < inner) inner = high[i] - at;
+    }
+    v->pixels[k] = (uint8_t)(inner < 0.3 ? (k * 37 + k / 7 * 11) % 256 : 150 + 20 * wall);
+    if (inner < 0.3) v->distance[k] = (float)nearest;
+  }
+}
+
+/* Four maps added and one removed, the planes, what is inferred along them, the mesh, and the mesh
+   with voxels of twice the side. */
+static void digest_room(const pair *p, tv_context *context) {
+  enum { MOST = 60000, BYTES = 8 << 20 };
+  static box_view views[4], inferred[4];
+  static float sigma[4][ROOM_PIXELS];
+  static tv_room_vertex vertices[MOST];
+  static tv_room_triangle triangles[2 * MOST];
+  static uint8_t block[BYTES + TV_CONTEXT_ALIGNMENT], scratch[8 * ROOM_PIXELS];
+  uint8_t *memory = block + TV_CONTEXT_ALIGNMENT - (uintptr_t)block % TV_CONTEXT_ALIGNMENT;
+  uint8_t *aligned = scratch + TV_CONTEXT_ALIGNMENT - (uintptr_t)scratch % TV_CONTEXT_ALIGNMENT;
+  tv_room_plane planes[8];
+  tv_room_plane_options options;
+  tv_camera camera;
+  tv_room *room;
+  int32_t k, num, num_triangles;
+  start();
+  must("scale", tv_camera_scale(&p->camera[0],
+                                ROOM_SIDE / (double)(p->camera[0].width > p->camera[0].height
+                                                         ? p->camera[0].width
+                                                         : p->camera[0].height),
+                                &camera));
+  must("room_init", tv_room_init(NULL, memory, BYTES, &room));
+  for (k = 0; k < 4; ++k) {
+    see_box(&camera, k, &views[k]);
+    must("room_add", tv_room_add(room, &camera, views[k].R, views[k].t, &views[k].map));
+  }
+  must("room_remove", tv_room_remove(room, &camera, views[1].R, views[1].t, &views[1].map));
+  tv_room_plane_options_init(&options);
+  options.gravity[1] = 1;
+  must("room_planes", tv_room_find_planes(room, &options, planes, 8, &num));
+  add_int(num);
+  add_bytes(planes, (size_t)num * sizeof *planes);
+  for (k = 0; k < 4; ++k) {
+    int32_t pixels;
+    inferred[k] = views[k];
+    must("room_infer", tv_room_infer(room, &camera, views[k].R, views[k].t, &views[k].map, planes,
+                                     num, NULL, aligned, sizeof scratch - TV_CONTEXT_ALIGNMENT,
+                                     inferred[k].distance, sigma[k], &pixels));
+    add_int(pixels);
+    inferred[k].map.distance = inferred[k].distance;
+    inferred[k].map.sigma = sigma[k];
+    inferred[k].map.inferred = 1;
+    must("room_add inferred",
+         tv_room_add(room, &camera, inferred[k].R, inferred[k].t, &inferred[k].map));
+  }
+  must("room_see", tv_room_see_through(room, &camera, views[0].R, views[0].t, &views[0].map));
+  for (k = 0; k < 2; ++k) {
+    if (k == 1) must("room_coarsen", tv_room_coarsen(room));
+    must("room_mesh",
+         tv_room_mesh(room, NULL, vertices, MOST, triangles, 2 * MOST, &num, &num_triangles));
+    add_int(num);
+    add_int(num_triangles);
+    add_bytes(vertices, (size_t)num * sizeof *vertices);
+    add_bytes(triangles, (size_t)num_triangles * sizeof *triangles);
+  }
+  print(p, context, "room");
+}
+
 static void digest_bundle(const pair *p, tv_context *context, const matched *m,
                           const tv_two_view *pose, const tv_point *points) {
   static tv_point adjusted[MAX_KEYPOINTS];
@@ -831,6 +942,7 @@ static void digest_pair(const pair *p, int32_t kernels) {
   /* One picture is enough, and the emulated ARM is slow. */
   if (strcmp(p->name, "scene") == 0 || strcmp(p->name, "motorcycle") == 0) {
     digest_odometry(p, context);
+    digest_room(p, context);
   }
   digest_reconstruct(p, context, 0, "reconstruct");
   digest_reconstruct(p, context, 1, "aligned");

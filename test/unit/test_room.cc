@@ -189,6 +189,367 @@ void test_removing_a_map_restores_the_room_bit_for_bit() {
   TEST_ASSERT_EQUAL(0, state.num_maps);
 }
 
+Scene hall() {
+  Scene scene;
+  scene.low = Vec3(0.013, -0.021, 0.007), scene.high = Vec3(4.02, 3.01, 2.51);
+  scene.centre = Vec3(2.2, 1.0, 0.6), scene.radius = 0.45;
+  return scene;
+}
+
+double distance_to(const Scene& scene, const Vec3& p) {
+  double nearest = std::fabs((p - scene.centre).norm() - scene.radius);
+  for (int i = 0; i < 3; ++i) {
+    nearest = std::min({nearest, std::fabs(p[i] - scene.low[i]), std::fabs(p[i] - scene.high[i])});
+  }
+  return nearest;
+}
+
+std::vector<Map> tour(const Scene& scene, const tv_camera& camera, int num, float sigma) {
+  std::vector<Map> maps;
+  for (int k = 0; k < num; ++k) {
+    const double a = 6.2831853 * k / num, b = a + 3.14 + (k % 3 - 1) * 0.5;
+    const Vec3 from(2 + 1.1 * std::cos(a), 1.7 + 0.9 * std::sin(a), 1.4 + 0.2 * std::sin(3 * a));
+    const Vec3 to = from + Vec3(std::cos(b), std::sin(b), (k % 3 - 1) * 0.6);
+    maps.push_back(box_room::see(scene, camera, from, to, sigma));
+  }
+  return maps;
+}
+
+void test_a_room_seen_from_inside_through_every_lens() {
+  const Scene scene = hall();
+  for (int lens = 0; lens < 3; ++lens) {
+    tv_camera camera = box_room::pinhole(160, 120, lens == 2 ? 70 : 110);
+    camera.model = lens == 0   ? TV_CAMERA_PINHOLE
+                   : lens == 1 ? TV_CAMERA_BROWN_CONRADY
+                               : TV_CAMERA_KANNALA_BRANDT;
+    if (lens == 1) camera.k[0] = -0.2, camera.k[1] = 0.04;
+    if (lens == 2) camera.k[0] = -0.02;
+    tv_room* room = new_room(0.04);
+    for (const Map& m : tour(scene, camera, 24, 0.02f)) TEST_ASSERT_EQUAL(TV_OK, add(room, m));
+    mesh(room);
+    TEST_ASSERT_TRUE(vertices.size() > 20000);
+    std::vector<double> errors;
+    size_t wrong_colours = 0;
+    for (size_t v = 0; v < vertices.size(); ++v) {
+      const Vec3 p = position(static_cast<int32_t>(v));
+      errors.push_back(distance_to(scene, p));
+      for (int i = 0; i < 3; ++i) {
+        wrong_colours += std::fabs(128 + 20 * p[i] - vertices[v].rgb[i]) > 3;
+      }
+    }
+    std::sort(errors.begin(), errors.end());
+    TEST_ASSERT_TRUE(errors[errors.size() / 2] < 0.001);
+    TEST_ASSERT_TRUE(errors[errors.size() * 99 / 100] < 0.012);
+    TEST_ASSERT_TRUE(errors.back() < 0.04);
+    TEST_ASSERT_TRUE(wrong_colours < vertices.size() / 100);
+    check_winding();
+  }
+}
+
+Map wall_at(double offset, const Vec3& from, float sigma) {
+  Scene wall;
+  wall.normal = Vec3(0, 1, 0), wall.offset = offset;
+  return box_room::see(wall, box_room::pinhole(160, 120, 140), from, from + Vec3(0, 1, 0), sigma);
+}
+
+size_t vertices_near(double y) {
+  return static_cast<size_t>(
+      std::count_if(vertices.begin(), vertices.end(), [y](const tv_room_vertex& v) {
+        return std::fabs(static_cast<double>(v.position[1]) - y) < 0.05;
+      }));
+}
+
+void test_what_others_see_through_vanishes_and_one_error_removes_no_wall() {
+  tv_room* room = new_room();
+  TEST_ASSERT_EQUAL(TV_OK, add(room, wall_at(1, Vec3(0, 0, 0), 0.03f)));  // it is not there
+  mesh(room);
+  TEST_ASSERT_TRUE(vertices_near(1) > 500);
+  for (int k = 0; k < 6; ++k) {
+    TEST_ASSERT_EQUAL(TV_OK, add(room, wall_at(2, Vec3(0.1 * k - 0.3, 0, 0), 0.01f)));
+  }
+  mesh(room);
+  TEST_ASSERT_EQUAL(0, vertices_near(1));
+  const size_t wall = vertices_near(2);
+  TEST_ASSERT_TRUE(wall > 2000);
+  TEST_ASSERT_EQUAL(TV_OK, add(room, wall_at(4, Vec3(0, 0, 0), 0.03f)));
+  mesh(room);
+  TEST_ASSERT_TRUE(vertices_near(2) > wall * 95 / 100);
+}
+
+void test_a_map_sees_through_later_blocks_when_told_and_is_removed_exactly_then() {
+  tv_room* room = new_room();
+  std::vector<Map> right;
+  for (int k = 0; k < 6; ++k) right.push_back(wall_at(2, Vec3(0.1 * k - 0.3, 0, 0), 0.01f));
+  const Map wrong = wall_at(1, Vec3(0, 0, 0), 0.03f);
+  for (const Map& m : right) TEST_ASSERT_EQUAL(TV_OK, add(room, m));
+  TEST_ASSERT_EQUAL(TV_OK, add(room, wrong));
+  mesh(room);
+  const size_t before = vertices_near(1);
+  TEST_ASSERT_TRUE(before > 500);
+  for (const Map& m : right) {
+    TEST_ASSERT_EQUAL(TV_OK, tv_room_see_through(room, &m.camera, m.R, m.t, &m.map));
+  }
+  mesh(room);
+  TEST_ASSERT_EQUAL(0, vertices_near(1));
+  // A second time nothing is left to see through: after a removal the sums are those from before.
+  for (const Map& m : right) {
+    TEST_ASSERT_EQUAL(TV_OK, tv_room_see_through(room, &m.camera, m.R, m.t, &m.map));
+  }
+  for (const Map& m : right) TEST_ASSERT_EQUAL(TV_OK, remove(room, m));
+  mesh(room);
+  TEST_ASSERT_EQUAL(before, vertices_near(1));
+  TEST_ASSERT_EQUAL(before, vertices.size());
+}
+
+// Memory for a tenth of the room: it says so, keeps what it has, and goes on with a coarser voxel.
+void test_a_room_that_is_full_keeps_what_it_has_and_goes_on_coarser() {
+  const Scene scene = hall();
+  const std::vector<Map> maps = tour(scene, box_room::pinhole(160, 120, 110), 24, 0.02f);
+  tv_room* room = new_room(kVoxel, 2 << 20);
+  tv_room_state state;
+  tv_room_state_init(&state);
+  int full = 0;
+  for (const Map& m : maps) {
+    mesh(room);
+    const std::vector<tv_room_vertex> was = vertices;
+    tv_status status = add(room, m);
+    if (status == TV_ERR_CAPACITY && full == 0) {
+      mesh(room);
+      TEST_ASSERT_EQUAL(was.size(), vertices.size());
+      TEST_ASSERT_EQUAL_MEMORY(was.data(), vertices.data(), was.size() * sizeof was[0]);
+    }
+    for (; status == TV_ERR_CAPACITY; ++full) {
+      TEST_ASSERT_EQUAL(TV_OK, tv_room_coarsen(room));
+      status = add(room, m);
+    }
+    TEST_ASSERT_EQUAL(TV_OK, status);
+  }
+  TEST_ASSERT_TRUE(full == 1 || full == 2);
+  TEST_ASSERT_EQUAL(TV_OK, tv_room_get_state(room, &state));
+  TEST_ASSERT_EQUAL(24, state.num_maps);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, kVoxel * (1 << full), state.voxel);
+  mesh(room);
+  std::vector<double> errors;
+  double area = 0;
+  for (const tv_room_triangle& f : triangles) {
+    const Vec3 a = position(f.idx_vertex[0]);
+    area += (position(f.idx_vertex[1]) - a).cross(position(f.idx_vertex[2]) - a).norm() / 2;
+    errors.push_back(distance_to(scene, a));
+  }
+  std::sort(errors.begin(), errors.end());
+  TEST_ASSERT_TRUE(errors[errors.size() / 2] < 0.05 * state.voxel);
+  TEST_ASSERT_TRUE(errors[errors.size() * 99 / 100] < 0.4 * state.voxel);
+  TEST_ASSERT_TRUE(area > 40);  // of 60, of which the tour does not see all
+  TEST_ASSERT_EQUAL(TV_ERR_ARGUMENT, remove(room, maps[0]));  // coarsening fixed it
+  TEST_ASSERT_EQUAL(TV_OK, remove(room, maps[23]));
+}
+
+void test_distances_that_are_none_are_unknown() {
+  const float odd[] = {0.0f, -1.0f, NAN, INFINITY, -INFINITY, 1e-38f, 3e38f};
+  tv_room* room = new_room();
+  Map m = wall_at(2.007, Vec3(0, 0, 0), 0.01f);
+  TEST_ASSERT_EQUAL(TV_OK, add(room, m));
+  mesh(room);
+  const std::vector<tv_room_vertex> was = vertices;
+  TEST_ASSERT_EQUAL(TV_OK, remove(room, m));
+  for (size_t k = 0; k < m.distance.size(); ++k) {
+    if (k / 160 % 2 != 0) m.distance[k] = odd[k % 5];
+  }
+  TEST_ASSERT_EQUAL(TV_OK, add(room, m));
+  mesh(room);
+  TEST_ASSERT_TRUE(vertices.size() > was.size() * 9 / 10);
+  for (const tv_room_vertex& v : vertices) {
+    TEST_ASSERT_FLOAT_WITHIN(0.01f, 2.007f, v.position[1]);
+  }
+  TEST_ASSERT_EQUAL(TV_OK, remove(room, m));
+  // Nothing is known at all, by each of the ways to say so.
+  for (int way = 0; way < 5; ++way) {
+    Map none = wall_at(2.007, Vec3(0, 0, 0), 0.01f);
+    const std::vector<uint8_t> witnesses(none.distance.size(), 0);
+    for (size_t k = 0; k < none.distance.size(); ++k) {
+      if (way == 0) none.distance[k] = odd[k % 7];
+      if (way == 1) none.sigma[k] = k % 2 != 0 ? NAN : 0.0f;
+      if (way == 2) none.sigma[k] = k % 2 != 0 ? INFINITY : -1.0f;
+      if (way == 3) none.sigma[k] = 1.0f;  // weighs nothing
+    }
+    if (way == 4) none.map.witnesses = witnesses.data();
+    TEST_ASSERT_EQUAL(TV_OK, add(room, none));
+    mesh(room);
+    TEST_ASSERT_EQUAL(0, vertices.size());
+    TEST_ASSERT_EQUAL(TV_OK, remove(room, none));
+  }
+  // Poses beyond what blocks can be counted to.
+  Map far = wall_at(2, Vec3(0, 0, 0), 0.01f);
+  far.t[0] = 1e15;
+  TEST_ASSERT_EQUAL(TV_OK, add(room, far));
+  mesh(room);
+  TEST_ASSERT_EQUAL(0, vertices.size());
+}
+
+void test_small_pieces_are_left_out() {
+  tv_room* room = new_room();
+  Map m = wall_at(2.007, Vec3(0, 0, 0), 0.01f);
+  for (size_t y = 40; y < 80; ++y) {
+    for (size_t x = 70; x < 78; ++x)
+      m.distance[y * 160 + x] = x < 76 && y > 56 && y < 63 ? 1.5f : 0;
+  }
+  TEST_ASSERT_EQUAL(TV_OK, add(room, m));
+  tv_room_mesh_options options;
+  tv_room_mesh_options_init(&options);
+  options.min_piece_triangles = 0;
+  mesh(room, &options);
+  TEST_ASSERT_TRUE(vertices_near(1.5) > 0);
+  mesh(room);
+  TEST_ASSERT_EQUAL(0, vertices_near(1.5));
+  TEST_ASSERT_TRUE(vertices_near(2.007) > 1000);
+}
+
+// ---- Planes, and what is inferred along them.
+
+// Whether a point of the hall has texture: within 15 cm of the edges, on the ball, on posters.
+bool has_texture(const Scene& scene, const Vec3& p, int* wall) {
+  double inner = 9;
+  *wall = 0;
+  for (int i = 0; i < 3; ++i) {
+    const double a = p[i] - scene.low[i], b = scene.high[i] - p[i];
+    if (a < 1e-3) *wall = 2 * i + 1;
+    if (b < 1e-3) *wall = 2 * i + 2;
+    if (a >= 1e-3 && b >= 1e-3) inner = std::min({inner, a, b});
+  }
+  const bool poster = *wall >= 1 && *wall <= 4 && std::fabs(p[2] - 1.4) < 0.2 &&
+                      std::fmod(p[0] + p[1] + 3, 1.5) < 0.4;
+  return *wall == 0 || inner < 0.15 || poster;
+}
+
+// Leaves only the distances where there is texture, and paints the walls plain elsewhere.
+void make_plain(const Scene& scene, Map* m, uint64_t seed) {
+  const tv::Camera lens = tv::prepare_camera(m->camera);
+  const Eigen::Map<const tv::Mat3> R(m->R);
+  const Vec3 from(m->t[0], m->t[1], m->t[2]);
+  tv::Random random = tv::random_seeded(seed);
+  for (size_t k = 0; k < m->distance.size(); ++k) {
+    Vec3 ray;
+    TEST_ASSERT_TRUE(tv::unproject(
+        lens,
+        tv::Vec2(static_cast<int>(k) % m->camera.width, static_cast<int>(k) / m->camera.width),
+        &ray, nullptr));
+    const Vec3 p = from + static_cast<double>(m->distance[k]) * (R * ray);
+    int wall;
+    const bool textured = has_texture(scene, p, &wall);
+    const double grey = textured ? scene::uniform(&random, 60, 200) : 160 + 8 * wall;
+    const double noisy = grey + scene::uniform(&random, -2, 2);
+    for (size_t c = 0; c < 3; ++c) m->pixels[3 * k + c] = static_cast<uint8_t>(noisy);
+    if (!textured) m->distance[k] = 0;
+    m->distance[k] *= static_cast<float>(1 + scene::uniform(&random, -0.005, 0.005));
+  }
+}
+
+struct Planes {
+  tv_room_plane planes[TV_ROOM_MAX_PLANES];
+  int32_t num;
+};
+
+Planes find_planes(tv_room* room, bool with_gravity) {
+  Planes found;
+  tv_room_plane_options options;
+  tv_room_plane_options_init(&options);
+  if (with_gravity) options.gravity[2] = -9.81;
+  TEST_ASSERT_EQUAL(
+      TV_OK, tv_room_find_planes(room, &options, found.planes, TV_ROOM_MAX_PLANES, &found.num));
+  return found;
+}
+
+// What is inferred for a map, which lives as long as these arrays.
+Map infer(tv_room* room, const Map& m, const Planes& planes, int32_t* num) {
+  alignas(64) static uint8_t scratch[1 << 20];
+  Map inferred = m;
+  TEST_ASSERT_EQUAL(TV_OK, tv_room_infer(room, &m.camera, m.R, m.t, &m.map, planes.planes,
+                                         planes.num, nullptr, scratch, sizeof scratch,
+                                         inferred.distance.data(), inferred.sigma.data(), num));
+  box_room::aim(&inferred);
+  inferred.map.inferred = 1;
+  return inferred;
+}
+
+void test_plain_walls_are_found_by_their_edges_and_inferred_between() {
+  const Scene scene = hall();
+  const tv_camera camera = box_room::pinhole(240, 180, 170);
+  std::vector<Map> maps = tour(scene, camera, 24, 0.02f), inferred(24);
+  tv_room* room = new_room();
+  for (size_t k = 0; k < maps.size(); ++k) {
+    make_plain(scene, &maps[k], k + 1);
+    box_room::aim(&maps[k]);
+    TEST_ASSERT_EQUAL(TV_OK, add(room, maps[k]));
+  }
+  const Planes planes = find_planes(room, true);
+  TEST_ASSERT_EQUAL(6, planes.num);
+  int upright = 0, level = 0;
+  for (int k = 0; k < 6; ++k) {
+    const tv_room_plane& p = planes.planes[k];
+    int axis = 0;
+    for (int i = 1; i < 3; ++i)
+      axis = std::fabs(p.normal[i]) > std::fabs(p.normal[axis]) ? i : axis;
+    TEST_ASSERT_TRUE(std::fabs(p.normal[axis]) > 0.9999);
+    const double at = p.normal[axis] > 0 ? scene.low[axis] : -scene.high[axis];
+    TEST_ASSERT_DOUBLE_WITHIN(0.01, at, p.offset);
+    upright += p.kind == TV_ROOM_PLANE_UPRIGHT, level += p.kind == TV_ROOM_PLANE_LEVEL;
+    TEST_ASSERT_TRUE(k == 0 || p.area <= 1.2 * planes.planes[k - 1].area);
+  }
+  TEST_ASSERT_EQUAL(4, upright);
+  TEST_ASSERT_EQUAL(2, level);
+  int64_t pixels = 0, wrong = 0;
+  for (size_t k = 0; k < maps.size(); ++k) {
+    int32_t num;
+    inferred[k] = infer(room, maps[k], planes, &num);
+    const Map truth = tour(scene, camera, 24, 0.02f)[k];
+    for (size_t i = 0; i < truth.distance.size(); ++i) {
+      if (inferred[k].distance[i] == 0) continue;
+      TEST_ASSERT_TRUE(maps[k].distance[i] == 0 && inferred[k].sigma[i] > 0);
+      ++pixels, --num;
+      wrong += std::fabs(inferred[k].distance[i] - truth.distance[i]) > 0.05f;
+    }
+    TEST_ASSERT_EQUAL(0, num);
+  }
+  TEST_ASSERT_TRUE(pixels > 300000);
+  TEST_ASSERT_TRUE(wrong * 50 < pixels);
+  mesh(room);
+  const size_t measured = vertices.size();
+  for (const Map& m : inferred) TEST_ASSERT_EQUAL(TV_OK, add(room, m));
+  for (const Map& m : maps) {
+    TEST_ASSERT_EQUAL(TV_OK, tv_room_see_through(room, &m.camera, m.R, m.t, &m.map));
+  }
+  mesh(room);
+  size_t num_inferred = 0, off = 0;
+  for (size_t v = 0; v < vertices.size(); ++v) {
+    num_inferred += vertices[v].inferred;
+    off += distance_to(scene, position(static_cast<int32_t>(v))) > 0.05;
+  }
+  TEST_ASSERT_TRUE(num_inferred > 20000);
+  TEST_ASSERT_TRUE(off * 100 < vertices.size());
+  tv_room_mesh_options options;
+  tv_room_mesh_options_init(&options);
+  options.measured_only = 1;
+  mesh(room, &options);
+  TEST_ASSERT_EQUAL(measured, vertices.size());
+  for (const tv_room_vertex& v : vertices) TEST_ASSERT_EQUAL(0, v.inferred);
+}
+
+void test_an_inferred_wall_that_a_map_sees_through_vanishes() {
+  tv_room* room = new_room();
+  Map inferred = wall_at(1, Vec3(0, 0, 0), 0.02f);
+  inferred.map.inferred = 1;
+  const Map measured = wall_at(2, Vec3(0, 0, 0), 0.02f);
+  TEST_ASSERT_EQUAL(TV_OK, add(room, measured));
+  TEST_ASSERT_EQUAL(TV_OK, add(room, inferred));
+  mesh(room);
+  TEST_ASSERT_TRUE(vertices_near(1) > 500);
+  TEST_ASSERT_EQUAL(
+      TV_OK, tv_room_see_through(room, &measured.camera, measured.R, measured.t, &measured.map));
+  mesh(room);
+  TEST_ASSERT_EQUAL(0, vertices_near(1));
+  TEST_ASSERT_TRUE(vertices_near(2) > 500);
+}
+
 }  // namespace
 
 int main(void) {
@@ -196,5 +557,13 @@ int main(void) {
   RUN_TEST(test_a_plane_between_voxels_is_where_it_is);
   RUN_TEST(test_a_ball_is_closed_and_its_signed_volume_is_right);
   RUN_TEST(test_removing_a_map_restores_the_room_bit_for_bit);
+  RUN_TEST(test_a_room_seen_from_inside_through_every_lens);
+  RUN_TEST(test_what_others_see_through_vanishes_and_one_error_removes_no_wall);
+  RUN_TEST(test_a_map_sees_through_later_blocks_when_told_and_is_removed_exactly_then);
+  RUN_TEST(test_a_room_that_is_full_keeps_what_it_has_and_goes_on_coarser);
+  RUN_TEST(test_distances_that_are_none_are_unknown);
+  RUN_TEST(test_small_pieces_are_left_out);
+  RUN_TEST(test_plain_walls_are_found_by_their_edges_and_inferred_between);
+  RUN_TEST(test_an_inferred_wall_that_a_map_sees_through_vanishes);
   return UNITY_END();
 }

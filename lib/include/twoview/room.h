@@ -121,10 +121,11 @@ TV_API tv_status tv_room_init(const tv_room_options *options, void *memory, size
 TV_API tv_status tv_room_add(tv_room *room, const tv_camera *camera, const double R[9],
                              const double t[3], const tv_depth_map *map);
 
-/* Removes a map that was added with the same camera, pose and contents: the sums are then those of
-   a room to which it was never added, bit for bit. TV_ERR_ARGUMENT where the room holds no map of
-   these arguments: none was added, it was removed already, or tv_room_coarsen has fixed it. Takes
-   the time of tv_room_add, and returns its statuses except TV_ERR_CAPACITY and TV_ERR_LIMITS. */
+/* Removes a map that was added with the same camera, pose R and t, and contents: the sums are then
+   those of a room to which it was never added, bit for bit. TV_ERR_ARGUMENT where the room holds no
+   map of these arguments: none was added, it was removed already, or tv_room_coarsen has fixed it.
+   Takes the time of tv_room_add, and returns its statuses except TV_ERR_CAPACITY and TV_ERR_LIMITS.
+ */
 TV_API tv_status tv_room_remove(tv_room *room, const tv_camera *camera, const double R[9],
                                 const double t[3], const tv_depth_map *map);
 
@@ -132,6 +133,13 @@ TV_API tv_status tv_room_remove(tv_room *room, const tv_camera *camera, const do
    was, but for the coarser voxel. The maps that are in the room stay in it for ever: tv_room_remove
    does not know them any more. Returns TV_ERR_NULL, TV_ERR_LIMITS (after 16 times). */
 TV_API tv_status tv_room_coarsen(tv_room *room);
+
+/* Lets a map that the room holds see through the blocks that were made since it was added, as if it
+   were added after them. What was inferred has to stand up to this: call it for each map after the
+   inferred ones were added. Takes the time of tv_room_add at most, and returns the statuses of
+   tv_room_remove. */
+TV_API tv_status tv_room_see_through(tv_room *room, const tv_camera *camera, const double R[9],
+                                     const double t[3], const tv_depth_map *map);
 
 /* What is in a room. */
 typedef struct tv_room_state {
@@ -143,7 +151,7 @@ typedef struct tv_room_state {
   int32_t num_blocks, cap_blocks;
   /* The side of a voxel now, in the unit of the poses. */
   double voxel;
-  /* The box of all blocks, in the world; zeros where there are none. */
+  /* The box of all blocks in the world, in the unit of the poses; zeros where there are none. */
   double min[3], max[3];
 } tv_room_state;
 
@@ -158,7 +166,7 @@ TV_API tv_status tv_room_get_state(const tv_room *room, tv_room_state *state);
 
 /* A vertex of the surface. */
 typedef struct tv_room_vertex {
-  /* Position in the world. */
+  /* Position in the world, in the unit of the poses. */
   float position[3];
   /* The unit normal, towards the free side. */
   float normal[3];
@@ -175,8 +183,9 @@ typedef struct tv_room_vertex {
   int32_t reserved;
 } tv_room_vertex;
 
-/* A triangle: the indices of its vertices, anticlockwise as seen from the free side. */
+/* A triangle of the surface. */
 typedef struct tv_room_triangle {
+  /* The indices of its vertices, anticlockwise as seen from the free side. */
   int32_t idx_vertex[3];
 } tv_room_triangle;
 
@@ -190,7 +199,8 @@ typedef struct tv_room_mesh_options {
   int32_t min_piece_triangles;
   /* 1: only what was measured; 0 (default): what was inferred, too. */
   int32_t measured_only;
-  /* Only blocks that touch this box of the world make vertices; zeros (default): all. */
+  /* Only blocks that touch this box of the world, in the unit of the poses, make triangles; zeros
+     (default): all. */
   double min[3], max[3];
 } tv_room_mesh_options;
 
@@ -217,6 +227,116 @@ TV_API tv_status tv_room_mesh(tv_room *room, const tv_room_mesh_options *options
                               tv_room_vertex *vertices, int32_t cap_vertices,
                               tv_room_triangle *triangles, int32_t cap_triangles,
                               int32_t *num_vertices, int32_t *num_triangles);
+
+/* The most planes of a room. */
+#define TV_ROOM_MAX_PLANES 64
+
+/* How a plane lies, where gravity is known. */
+typedef enum tv_room_plane_kind {
+  /* Oblique, or gravity is not known. */
+  TV_ROOM_PLANE_OTHER = 0,
+  /* A wall, a cupboard's door: upright to within 10 degrees. */
+  TV_ROOM_PLANE_UPRIGHT = 1,
+  /* A floor, a ceiling, a table: level to within 10 degrees. */
+  TV_ROOM_PLANE_LEVEL = 2
+} tv_room_plane_kind;
+
+/* A plane of the room's measured surface. */
+typedef struct tv_room_plane {
+  /* The unit normal, towards the free side. */
+  double normal[3];
+  /* normal . x of its points, in the unit of the poses. */
+  double offset;
+  /* The middle of what was measured of it. */
+  double centre[3];
+  /* How much was measured of it, in squares of the unit. */
+  double area;
+  /* The root mean square of the distances of its blocks' surfaces from it. */
+  double sigma;
+  /* A tv_room_plane_kind. */
+  int32_t kind;
+  /* Always 0. */
+  int32_t reserved;
+} tv_room_plane;
+
+/* Options of tv_room_find_planes. Filled by tv_room_plane_options_init. */
+typedef struct tv_room_plane_options {
+  /* The caller's sizeof, set by tv_room_plane_options_init. */
+  uint32_t struct_size;
+  /* Must be 0. */
+  int32_t reserved;
+  /* The least area of a plane that was measured, in squares of the unit of the poses; 0 (default):
+     640 squares of a voxel's side, 0.58 square metres at 3 cm. */
+  double min_area;
+  /* The direction of gravity in the world, of any length: down. Zeros (default): it is not known.
+   */
+  double gravity[3];
+  /* The standard deviation of that direction in radians, (0, 1], default 0.02. Planes that are
+     nearly upright or level are drawn to be so by it. */
+  double gravity_sigma_rad;
+} tv_room_plane_options;
+
+/* Writes the default options into a struct of struct_size bytes; null is allowed. Programs call
+   tv_room_plane_options_init. */
+TV_API void tv_room_plane_options_init_sized(tv_room_plane_options *options, size_t struct_size);
+/* Writes the default options; null is allowed. */
+#define tv_room_plane_options_init(options) \
+  tv_room_plane_options_init_sized((options), sizeof *(options))
+
+/* Finds the planes of the measured surface, the largest first: the one of 256 candidates, the
+   surfaces of blocks, that most of the surface lies on, within 1.5 voxels and 20 degrees, then
+   refined by least squares; and again among what is left.
+   options: null means the defaults. planes: room for cap_planes, [0, TV_ROOM_MAX_PLANES].
+   *num_planes: how many were written. The room is only read, but for scratch in its memory. Takes
+   a step for each voxel of the room, and for each plane a million at most.
+   Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (an option, the capacity),
+   TV_ERR_NOT_FINITE (an option), TV_ERR_OVERLAP. */
+TV_API tv_status tv_room_find_planes(tv_room *room, const tv_room_plane_options *options,
+                                     tv_room_plane *planes, int32_t cap_planes,
+                                     int32_t *num_planes);
+
+/* Options of tv_room_infer. Filled by tv_room_infer_options_init. */
+typedef struct tv_room_infer_options {
+  /* The caller's sizeof, set by tv_room_infer_options_init. */
+  uint32_t struct_size;
+  /* The largest difference between neighbours, in grey levels of the picture smoothed by 3 x 3
+     pixels, that counts as no texture, [0, 255], default 3. */
+  int32_t max_step;
+} tv_room_infer_options;
+
+/* Writes the default options into a struct of struct_size bytes; null is allowed. Programs call
+   tv_room_infer_options_init. */
+TV_API void tv_room_infer_options_init_sized(tv_room_infer_options *options, size_t struct_size);
+/* Writes the default options; null is allowed. */
+#define tv_room_infer_options_init(options) \
+  tv_room_infer_options_init_sized((options), sizeof *(options))
+
+/* Writes to *size_bytes how much memory tv_room_infer needs for a map of this size: 6 bytes a
+   pixel. Returns TV_ERR_NULL, TV_ERR_ARGUMENT (a side outside [1, 16384]). */
+TV_API tv_status tv_room_infer_size(int32_t width, int32_t height, size_t *size_bytes);
+
+/* Carries planes across what has no texture: the distances that a map lacks, of pixels in a region
+   of its picture without texture, at whose edge or in which enough was measured on a plane, and
+   little elsewhere. Where several planes qualify, the nearest along the ray is seen. Where the room
+   has a measured surface, or a map saw through there, nothing is inferred.
+   room, camera, R, t, map: as for tv_room_add; the map needs `pixels` and was measured
+   (TV_ERR_ARGUMENT). planes: num_planes of tv_room_find_planes.
+   options: null means the defaults. memory: starts at a multiple of TV_CONTEXT_ALIGNMENT and has at
+   least the bytes of tv_room_infer_size; free for other use after the call.
+   distance, sigma: room for width x height each, row by row without gaps; 0 where nothing was
+   inferred. *num_pixels: how many pixels were. They are the arrays of another map of the same
+   camera and pose, whose `inferred` is 1: add it, and call tv_room_see_through for the measured
+   ones, which may contradict it.
+   Takes pixels x planes steps at most. The room is only read.
+   Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (the map, R, an option, num_planes),
+   TV_ERR_NOT_FINITE (R, t or a plane), TV_ERR_CAMERA, TV_ERR_ALIGNMENT, TV_ERR_MEMORY,
+   TV_ERR_OVERLAP. */
+TV_API tv_status tv_room_infer(const tv_room *room, const tv_camera *camera, const double R[9],
+                               const double t[3], const tv_depth_map *map,
+                               const tv_room_plane *planes, int32_t num_planes,
+                               const tv_room_infer_options *options, void *memory,
+                               size_t size_bytes, float *distance, float *sigma,
+                               int32_t *num_pixels);
 
 TV_END_DECLS
 

@@ -1,13 +1,17 @@
 // The entry points of the room: they validate, and call the stages of lib/src/room.
 #include "twoview/room.h"
 
+#include <cmath>
+
 #include "api/sized.h"
 #include "api/validate.h"
 #include "api/within.h"
 #include "geometry/essential.h"
 #include "room/coarsen.h"
 #include "room/fuse.h"
+#include "room/infer.h"
 #include "room/mesh.h"
+#include "room/planes.h"
 
 namespace tv {
 namespace {
@@ -17,6 +21,10 @@ constexpr int32_t kMaxLevels = 16;
 constexpr tv_room_options kDefaults = {sizeof(tv_room_options), 3, 0.03, 0.0};
 constexpr tv_room_mesh_options kMeshDefaults = {
     sizeof(tv_room_mesh_options), 1, 64, 0, {0, 0, 0}, {0, 0, 0}};
+constexpr tv_room_plane_options kPlaneDefaults = {
+    sizeof(tv_room_plane_options), 0, 0, {0, 0, 0}, 0.02};
+constexpr tv_room_infer_options kInferDefaults = {sizeof(tv_room_infer_options), 3};
+constexpr double kLeastArea = 640;  // squares of a voxel's side: 40 sides of a block
 
 tv_status read_options(const tv_room_options* given, tv_room_options* options) {
   *options = kDefaults;
@@ -65,6 +73,50 @@ tv_status read_view(const tv_room* room, const tv_camera* camera, const double R
   return TV_OK;
 }
 
+// All memory of a room.
+Bytes bytes_of(const tv_room& room) {
+  const uint8_t* from = reinterpret_cast<const uint8_t*>(&room);
+  const Voxel* end = room.voxels + static_cast<size_t>(room.cap_blocks) * kBlockVoxels;
+  return {from, static_cast<size_t>(reinterpret_cast<const uint8_t*>(end) - from)};
+}
+
+// The record of a map that was added with these contents, of equal ones the last; -1 without.
+int32_t record_of(const tv_room& room, const RoomView& view) {
+  const uint64_t digest = digest_of(view);
+  int32_t k = room.num_records - 1;
+  while (k >= 0 && room.records[k].digest != digest) --k;
+  return k;
+}
+
+tv_status read_plane_request(const tv_room& room, const tv_room_plane_options* given,
+                             PlaneRequest* request) {
+  tv_room_plane_options o = kPlaneDefaults;
+  const tv_status status = read_sized(given, &o);
+  if (status != TV_OK) return status;
+  if (!is_finite(o.min_area) || !all_finite(o.gravity, 3) || !is_finite(o.gravity_sigma_rad)) {
+    return TV_ERR_NOT_FINITE;
+  }
+  const double voxel = room.options.voxel;
+  *request = {o.min_area > 0 ? o.min_area : kLeastArea * voxel * voxel,
+              false,
+              {0, 0, 0},
+              o.gravity_sigma_rad};
+  double length = 0;
+  for (const double g : o.gravity) length = std::fmax(length, std::fabs(g));
+  if (length > 0) {
+    double sum = 0;
+    for (int i = 0; i < 3; ++i) {
+      request->up[i] = -o.gravity[i] / length;
+      sum += request->up[i] * request->up[i];
+    }
+    for (double& u : request->up) u /= std::sqrt(sum);
+    request->has_gravity = true;
+  }
+  const bool valid =
+      o.reserved == 0 && o.min_area >= 0 && o.gravity_sigma_rad > 0 && o.gravity_sigma_rad <= 1;
+  return valid ? TV_OK : TV_ERR_ARGUMENT;
+}
+
 tv_status read_request(const tv_room& room, const tv_room_mesh_options* given,
                        MeshRequest* request) {
   tv_room_mesh_options o = kMeshDefaults;
@@ -108,6 +160,14 @@ void tv_room_mesh_options_init_sized(tv_room_mesh_options* options, size_t struc
   tv::init_sized(options, struct_size, &tv::kMeshDefaults, sizeof tv::kMeshDefaults);
 }
 
+void tv_room_plane_options_init_sized(tv_room_plane_options* options, size_t struct_size) {
+  tv::init_sized(options, struct_size, &tv::kPlaneDefaults, sizeof tv::kPlaneDefaults);
+}
+
+void tv_room_infer_options_init_sized(tv_room_infer_options* options, size_t struct_size) {
+  tv::init_sized(options, struct_size, &tv::kInferDefaults, sizeof tv::kInferDefaults);
+}
+
 tv_status tv_room_init(const tv_room_options* options, void* memory, size_t size_bytes,
                        tv_room** room) {
   if (memory == nullptr || room == nullptr) return TV_ERR_NULL;
@@ -138,16 +198,25 @@ tv_status tv_room_remove(tv_room* room, const tv_camera* camera, const double R[
   tv::RoomView view;
   const tv_status status = tv::read_view(room, camera, R, t, map, &view);
   if (status != TV_OK) return status;
-  const uint64_t digest = tv::digest_of(view);
-  // Of equal maps, the one that was added last.
-  int32_t k = room->num_records - 1;
-  while (k >= 0 && room->records[k].digest != digest) --k;
+  int32_t k = tv::record_of(*room, view);
   if (k < 0) return TV_ERR_ARGUMENT;
   tv::find_near_blocks(*room, view);
   tv::subtract_view(*room, view, room->records[k].added_at);
   --room->num_maps;
   --room->num_records;
   for (; k < room->num_records; ++k) room->records[k] = room->records[k + 1];
+  return TV_OK;
+}
+
+tv_status tv_room_see_through(tv_room* room, const tv_camera* camera, const double R[9],
+                              const double t[3], const tv_depth_map* map) {
+  tv::RoomView view;
+  const tv_status status = tv::read_view(room, camera, R, t, map, &view);
+  if (status != TV_OK) return status;
+  const int32_t k = tv::record_of(*room, view);
+  if (k < 0) return TV_ERR_ARGUMENT;
+  tv::see_through(*room, view, room->records[k].added_at);
+  room->records[k].added_at = room->num_calls;
   return TV_OK;
 }
 
@@ -194,17 +263,13 @@ tv_status tv_room_mesh(tv_room* room, const tv_room_mesh_options* options, tv_ro
   const tv_status status = tv::read_request(*room, options, &request);
   if (status != TV_OK) return status;
   if (cap_vertices < 0 || cap_triangles < 0) return TV_ERR_ARGUMENT;
-  const tv::Bytes arrays[6] = {
+  const tv::Bytes arrays[5] = {
       {vertices, static_cast<size_t>(cap_vertices) * sizeof(tv_room_vertex)},
       {triangles, static_cast<size_t>(cap_triangles) * sizeof(tv_room_triangle)},
       {num_vertices, sizeof *num_vertices},
       {num_triangles, sizeof *num_triangles},
-      {room, sizeof *room},
-      {room->records, static_cast<size_t>(reinterpret_cast<const uint8_t*>(
-                                              room->voxels + static_cast<size_t>(room->cap_blocks) *
-                                                                 tv::kBlockVoxels) -
-                                          reinterpret_cast<const uint8_t*>(room->records))}};
-  if (tv::outputs_overlap(arrays, 4, 6)) return TV_ERR_OVERLAP;
+      tv::bytes_of(*room)};
+  if (tv::outputs_overlap(arrays, 4, 5)) return TV_ERR_OVERLAP;
   int64_t most_vertices, most_triangles;
   tv::count_mesh(*room, request, &most_vertices, &most_triangles);
   if (most_vertices > INT32_MAX || most_triangles > INT32_MAX) return TV_ERR_LIMITS;
@@ -215,5 +280,79 @@ tv_status tv_room_mesh(tv_room* room, const tv_room_mesh_options* options, tv_ro
   tv::write_mesh(*room, request, &output);
   *num_vertices = output.num_vertices;
   *num_triangles = output.num_triangles;
+  return TV_OK;
+}
+
+tv_status tv_room_find_planes(tv_room* room, const tv_room_plane_options* options,
+                              tv_room_plane* planes, int32_t cap_planes, int32_t* num_planes) {
+  if (room == nullptr || num_planes == nullptr || (planes == nullptr && cap_planes > 0)) {
+    return TV_ERR_NULL;
+  }
+  tv::PlaneRequest request;
+  const tv_status status = tv::read_plane_request(*room, options, &request);
+  if (status != TV_OK) return status;
+  if (!tv::within(cap_planes, 0, TV_ROOM_MAX_PLANES)) return TV_ERR_ARGUMENT;
+  const tv::Bytes arrays[3] = {{planes, static_cast<size_t>(cap_planes) * sizeof(tv_room_plane)},
+                               {num_planes, sizeof *num_planes},
+                               tv::bytes_of(*room)};
+  if (tv::outputs_overlap(arrays, 2, 3)) return TV_ERR_OVERLAP;
+  *num_planes = tv::find_planes(*room, request, planes, cap_planes);
+  return TV_OK;
+}
+
+tv_status tv_room_infer_size(int32_t width, int32_t height, size_t* size_bytes) {
+  if (size_bytes == nullptr) return TV_ERR_NULL;
+  if (!tv::within(width, 1, tv::kMaxSide) || !tv::within(height, 1, tv::kMaxSide)) {
+    return TV_ERR_ARGUMENT;
+  }
+  *size_bytes = tv::infer_bytes(width, height);
+  return TV_OK;
+}
+
+tv_status tv_room_infer(const tv_room* room, const tv_camera* camera, const double R[9],
+                        const double t[3], const tv_depth_map* map, const tv_room_plane* planes,
+                        int32_t num_planes, const tv_room_infer_options* options, void* memory,
+                        size_t size_bytes, float* distance, float* sigma, int32_t* num_pixels) {
+  if ((planes == nullptr && num_planes > 0) || memory == nullptr || distance == nullptr ||
+      sigma == nullptr || num_pixels == nullptr) {
+    return TV_ERR_NULL;
+  }
+  tv::RoomView view;
+  tv_status status = tv::read_view(room, camera, R, t, map, &view);
+  tv_room_infer_options checked = tv::kInferDefaults;
+  if (status == TV_OK) status = tv::read_sized(options, &checked);
+  if (status != TV_OK) return status;
+  if (view.map.pixels == nullptr || view.map.inferred != 0 ||
+      !tv::within(num_planes, 0, TV_ROOM_MAX_PLANES) || !tv::within(checked.max_step, 0, 255)) {
+    return TV_ERR_ARGUMENT;
+  }
+  for (int32_t k = 0; k < num_planes; ++k) {
+    const tv_room_plane& p = planes[k];
+    if (!tv::all_finite(p.normal, 3) || !tv::is_finite(p.offset) || !tv::is_finite(p.sigma)) {
+      return TV_ERR_NOT_FINITE;
+    }
+  }
+  if (reinterpret_cast<uintptr_t>(memory) % TV_CONTEXT_ALIGNMENT != 0) return TV_ERR_ALIGNMENT;
+  if (size_bytes < tv::infer_bytes(view.map.width, view.map.height)) return TV_ERR_MEMORY;
+  const size_t pixels = static_cast<size_t>(view.map.width) * static_cast<size_t>(view.map.height);
+  const size_t strided =
+      static_cast<size_t>(view.map.stride) * static_cast<size_t>(view.map.height - 1) +
+      static_cast<size_t>(view.map.width);
+  const tv_image picture = {view.map.pixels, view.map.channels * view.map.width, view.map.height,
+                            view.map.pixel_stride_bytes};
+  const tv::Bytes arrays[10] = {{distance, pixels * sizeof *distance},
+                                {sigma, pixels * sizeof *sigma},
+                                {num_pixels, sizeof *num_pixels},
+                                {memory, size_bytes},
+                                tv::bytes_of(*room),
+                                {planes, static_cast<size_t>(num_planes) * sizeof(tv_room_plane)},
+                                {view.map.distance, strided * sizeof(float)},
+                                {view.map.sigma, strided * sizeof(float)},
+                                {view.map.witnesses, strided},
+                                {view.map.pixels, tv::image_bytes(picture)}};
+  if (tv::outputs_overlap(arrays, 4, 10)) return TV_ERR_OVERLAP;
+  tv::Arena arena = tv::arena_over(memory, size_bytes);
+  *num_pixels = tv::infer_distances(*room, view, {planes, num_planes, checked.max_step}, arena,
+                                    distance, sigma);
   return TV_OK;
 }

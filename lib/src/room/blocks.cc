@@ -21,6 +21,7 @@ tv_room* lay_out(Arena& arena, int32_t cap_blocks, size_t buckets, tv_room* room
   tv_room* place = arena_alloc<tv_room>(arena, 1);
   room->records = arena_alloc<MapRecord>(arena, TV_ROOM_MAX_MAPS);
   room->blocks = arena_alloc<Block>(arena, blocks);
+  room->surfels = arena_alloc<Surfel>(arena, blocks);
   room->near = arena_alloc<int32_t>(arena, blocks);
   room->buckets = arena_alloc<int32_t>(arena, buckets);
   room->voxels = arena_alloc<Voxel>(arena, blocks * kBlockVoxels);
@@ -33,14 +34,15 @@ tv_room* make_room(const tv_room_options& options, void* memory, size_t size_byt
   tv_room made = {};
   made.options = options;
   // As many buckets as a power of two that is not below half the number of blocks.
-  const size_t block_bytes = sizeof(Block) + kBlockVoxels * sizeof(Voxel) + sizeof(int32_t);
+  const size_t block_bytes =
+      sizeof(Block) + sizeof(Surfel) + kBlockVoxels * sizeof(Voxel) + sizeof(int32_t);
   int bits = 1;
   while (bits < 28 && (block_bytes << (bits + 1)) < size_bytes) ++bits;
   const size_t buckets = size_t{1} << bits;
   made.bucket_shift = 64 - bits;
   Arena measure = measuring_arena();
   lay_out(measure, 0, buckets, &made);
-  // What the three arrays of blocks lose to alignment is below a block.
+  // What the four arrays of blocks lose to alignment is below a block.
   const size_t left = (size_bytes - measure.used_bytes) / block_bytes - 1;
   made.cap_blocks = static_cast<int32_t>(left < (1u << 30) ? left : (1u << 30));
   Arena arena = arena_over(memory, size_bytes);

@@ -71,6 +71,13 @@ struct Block {
   int32_t index;     // scratch of the mesh: of the first of its vertices
 };
 
+// The surface in a block: a sample of it for the planes.
+struct Surfel {
+  float mean[3], normal[3];
+  float area, sigma;  // area 0: there is none, or it has no common normal
+  int32_t plane;
+};
+
 // A map that was added. `added_at` is the number of the call that added it.
 struct MapRecord {
   uint64_t digest;
@@ -94,7 +101,8 @@ struct tv_room {
   int32_t bucket_shift;  // 64 less the bits of a bucket's index
   tv::MapRecord* records;
   tv::Block* blocks;
-  tv::Voxel* voxels;  // kBlockVoxels of each block
+  tv::Surfel* surfels;  // scratch of the planes, one of each block
+  tv::Voxel* voxels;    // kBlockVoxels of each block
   int32_t* near;
   int32_t* buckets;  // the first block of each, or -1
 };

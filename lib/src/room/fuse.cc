@@ -6,25 +6,22 @@
 namespace tv {
 namespace {
 
-// What a view measured at a pixel. The weight is 0 where it is unknown.
-struct Measured {
-  double distance, sigma;
-  int32_t weight;
-};
-
 // Without sigmas, a hundredth of the distance.
 constexpr double kRelativeSigma = 0.01;
 // The weight of a pixel whose sigma is a voxel. With the largest weight of 64 the smallest sigma
 // that counts is half a voxel: the voxels' own resolution.
 constexpr double kUnitWeight = 16;
+// Where the nearest pixel is unknown, a neighbour stands in for it with this part of its weight: it
+// fills holes, and yet moves an outline, where others see it, by little.
+constexpr int32_t kBorrowed = 4;
 
 struct Fusion {
-  tv_room& room;
+  const tv_room& room;
   const RoomView& view;
   double voxel, truncation, max_distance;
 };
 
-Fusion fusion_of(tv_room& room, const RoomView& view) {
+Fusion fusion_of(const tv_room& room, const RoomView& view) {
   const tv_room_options& o = room.options;
   return {room, view, o.voxel, o.voxel * o.truncation_voxels,
           o.max_distance > 0 ? o.max_distance : 1e30};
@@ -43,6 +40,25 @@ Measured measured_at(const Fusion& f, int32_t x, int32_t y) {
   const double ratio = f.voxel / sigma;
   const double weight = kUnitWeight * (ratio * ratio) + 0.5;
   return {distance, sigma, weight < kMaxWeight ? static_cast<int32_t>(weight) : kMaxWeight};
+}
+
+// The known pixel that is nearest to (u, v), of the four around it. Its weight is 0 where none is
+// known.
+Measured nearest_known(const Fusion& f, double u, double v, int32_t* x, int32_t* y) {
+  const int32_t x0 = floor_of(u), y0 = floor_of(v);
+  const bool right = u - x0 >= 0.5, low = v - y0 >= 0.5;
+  const double a = right ? x0 + 1 - u : u - x0, b = low ? y0 + 1 - v : v - y0;
+  Measured m = {0, 0, 0};
+  for (int k = 0; k < 4 && m.weight == 0; ++k) {
+    // The nearest first, the opposite last, between them the one across the smaller gap.
+    const bool across = k == 3 || k == (a > b ? 1 : 2);
+    const bool down = k == 3 || k == (a > b ? 2 : 1);
+    *x = x0 + (right != across), *y = y0 + (low != down);
+    const tv_depth_map& map = f.view.map;
+    if (*x >= 0 && *y >= 0 && *x < map.width && *y < map.height) m = measured_at(f, *x, *y);
+    if (k > 0 && m.weight > 0) m.weight = (m.weight + kBorrowed - 1) / kBorrowed;
+  }
+  return m;
 }
 
 // The distance at a pixel (u, v), nearest to (x, y): interpolated, where the four pixels around it
@@ -93,8 +109,8 @@ bool pixel_of(const RoomView& view, const Vec3& point, double* u, double* v) {
 bool contribution(const Fusion& f, const Vec3& point, bool near, Voxel* added) {
   double u, v;
   if (!pixel_of(f.view, point, &u, &v)) return false;
-  const int32_t x = floor_of(u + 0.5), y = floor_of(v + 0.5);
-  const Measured m = measured_at(f, x, y);
+  int32_t x, y;
+  const Measured m = nearest_known(f, u, v, &x, &y);
   if (m.weight == 0) return false;
   const double range = std::sqrt((point[0] * point[0] + point[1] * point[1]) + point[2] * point[2]);
   const double in_front = m.distance - range;
@@ -221,8 +237,8 @@ bool visit_near(const Fusion& f, const Visit& visit) {
   return true;
 }
 
-void fuse(const Fusion& f, uint32_t added_at, bool subtract) {
-  tv_room& room = f.room;
+void fuse(tv_room& room, const RoomView& view, uint32_t added_at, bool subtract) {
+  const Fusion f = fusion_of(room, view);
   const bool sees_through = f.view.map.inferred == 0;
   for (int32_t k = 0; k < room.num_near; ++k) {
     const int32_t index = room.near[k];
@@ -264,6 +280,10 @@ uint64_t digest_rows(uint64_t digest, const void* data, size_t row_bytes, int64_
 }
 
 }  // namespace
+
+Measured measured_at(const tv_room& room, const RoomView& view, int32_t x, int32_t y) {
+  return measured_at(fusion_of(room, view), x, y);
+}
 
 uint64_t digest_of(const RoomView& view) {
   const tv_depth_map& map = view.map;
@@ -310,12 +330,19 @@ void find_near_blocks(tv_room& room, const RoomView& view) {
   });
 }
 
-void add_view(tv_room& room, const RoomView& view) {
-  fuse(fusion_of(room, view), room.num_calls, false);
-}
+void add_view(tv_room& room, const RoomView& view) { fuse(room, view, room.num_calls, false); }
 
 void subtract_view(tv_room& room, const RoomView& view, uint32_t added_at) {
-  fuse(fusion_of(room, view), added_at, true);
+  fuse(room, view, added_at, true);
+}
+
+void see_through(tv_room& room, const RoomView& view, uint32_t added_at) {
+  const Fusion f = fusion_of(room, view);
+  for (int32_t index = 0; view.map.inferred == 0 && index < room.end_blocks; ++index) {
+    const Block& block = room.blocks[index];
+    if (block.key == 0 || block.born_at <= added_at) continue;
+    if (may_see(f, index)) fuse_block(f, index, false, true, false);
+  }
 }
 
 }  // namespace tv

@@ -14,6 +14,14 @@ struct RoomView {
   tv_depth_map map;
 };
 
+// What a view measured at a pixel. The weight is 0 where it is unknown.
+struct Measured {
+  double distance, sigma;
+  int32_t weight;
+};
+
+Measured measured_at(const tv_room& room, const RoomView& view, int32_t x, int32_t y);
+
 // A number that tells views apart by their contents.
 uint64_t digest_of(const RoomView& view);
 
@@ -28,5 +36,8 @@ void find_near_blocks(tv_room& room, const RoomView& view);
 // others; or subtracts them, with what it saw through in those that existed when it was added.
 void add_view(tv_room& room, const RoomView& view);
 void subtract_view(tv_room& room, const RoomView& view, uint32_t added_at);
+
+// Adds what the view sees through in the blocks that were made since it was added.
+void see_through(tv_room& room, const RoomView& view, uint32_t added_at);
 
 }  // namespace tv

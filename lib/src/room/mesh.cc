@@ -10,6 +10,10 @@ constexpr int32_t kGrid = kBlockSide + 1;  // a block's voxels, and the first of
 constexpr int32_t kGridStep[3] = {1, kGrid, kGrid* kGrid};
 // What a map that sees through a voxel weighs there, against those that see a surface.
 constexpr int32_t kFreeWeight = 8;
+// What was inferred counts where more than four maps inferred it for each that sees through it.
+constexpr int32_t kMostThroughInferred = 4;
+// The least length of the mean of a block's normals.
+constexpr float kLeastCoherence = 0.8f;
 // The largest difference of two neighbours between which the surface passes. Without noise it is
 // 127 over the truncation in voxels; beyond, one of them belongs to the back of something.
 constexpr float kMostStep = 127;
@@ -26,7 +30,9 @@ struct Sample {
 
 Sample sample_of(const Voxel* voxel, bool inferred, int32_t min_maps) {
   const uint64_t e = voxel->evidence;
-  if (surface_count(e) < (inferred ? 1 : min_maps)) return {0, false, inferred, voxel};
+  const bool known = inferred ? surface_count(e) > kMostThroughInferred * free_count(e)
+                              : surface_count(e) >= min_maps;
+  if (!known) return {0, false, inferred, voxel};
   const int32_t weight = weight_sum(e);
   const int32_t against = free_count(e) * kFreeWeight;
   const int32_t counted = against < weight ? against : weight;
@@ -133,9 +139,12 @@ const Sample* cell_of(const Sample* grid, int32_t cell) {
          (cell / (kBlockSide * kBlockSide)) * kGridStep[2];
 }
 
-// The vertex of a cell whose first voxel has these coordinates, in voxels.
-void make_vertex(const tv_room& room, const Sample* cell, const int32_t corner[3],
+// The vertex of a cell of a block.
+void make_vertex(const tv_room& room, const Sample* cell, const BlockPlace& place, int32_t number,
                  tv_room_vertex* vertex) {
+  const int32_t corner[3] = {place.x * kBlockSide + number % kBlockSide,
+                             place.y * kBlockSide + number / kBlockSide % kBlockSide,
+                             place.z * kBlockSide + number / (kBlockSide * kBlockSide)};
   float sum[3] = {0, 0, 0}, gradient[3];
   int32_t crossings = 0, inferred = 0, maps = 0;
   int64_t colour[3] = {0, 0, 0}, maps_of_colour = 0, weight = 0;
@@ -331,6 +340,42 @@ void count_mesh(tv_room& room, const MeshRequest& request, int64_t* num_vertices
   }
 }
 
+void make_surfels(tv_room& room) {
+  Sample grid[kGrid * kGrid * kGrid];
+  const MeshRequest request = {1, 0, true, {}, {}};
+  const float voxel = static_cast<float>(room.options.voxel);
+  for (int32_t index = 0; index < room.end_blocks; ++index) {
+    Surfel& surfel = room.surfels[index];
+    surfel = {};
+    const uint64_t key = room.blocks[index].key;
+    if (key == 0 || place_of(key).inferred) continue;
+    const BlockPlace place = place_of(key);
+    gather(room, request, place, grid);
+    float count = 0, normal[3] = {0, 0, 0}, mean[3] = {0, 0, 0}, sigma = 0;
+    for (int32_t cell = 0; cell < kBlockVoxels; ++cell) {
+      const Sample* corner = cell_of(grid, cell);
+      if (!has_vertex(room, corner)) continue;
+      tv_room_vertex vertex;
+      make_vertex(room, corner, place, cell, &vertex);
+      for (int i = 0; i < 3; ++i) mean[i] += vertex.position[i], normal[i] += vertex.normal[i];
+      sigma += vertex.sigma;
+      ++count;
+    }
+    float length = 0, cells = 0;
+    for (const float n : normal) length += n * n;
+    length = std::sqrt(length);
+    if (!(length > kLeastCoherence * count)) continue;
+    for (int i = 0; i < 3; ++i) {
+      surfel.mean[i] = mean[i] / count;
+      surfel.normal[i] = normal[i] / length;
+      cells += std::fabs(surfel.normal[i]);
+    }
+    // A plane passes through |nx| + |ny| + |nz| cells in the area of a voxel's side.
+    surfel.area = count * voxel * voxel / cells;
+    surfel.sigma = sigma / count;
+  }
+}
+
 void write_mesh(tv_room& room, const MeshRequest& request, MeshOutput* output) {
   Sample grid[kGrid * kGrid * kGrid];
   output->num_vertices = output->num_triangles = 0;
@@ -341,11 +386,8 @@ void write_mesh(tv_room& room, const MeshRequest& request, MeshOutput* output) {
     gather(room, request, place, grid);
     for (int32_t cell = 0; cell < kBlockVoxels; ++cell) {
       if ((block.cells >> cell & 1) == 0) continue;
-      const int32_t corner[3] = {place.x * kBlockSide + cell % kBlockSide,
-                                 place.y * kBlockSide + cell / kBlockSide % kBlockSide,
-                                 place.z * kBlockSide + cell / (kBlockSide * kBlockSide)};
       tv_room_vertex* vertex = &output->vertices[output->num_vertices++];
-      make_vertex(room, cell_of(grid, cell), corner, vertex);
+      make_vertex(room, cell_of(grid, cell), place, cell, vertex);
       vertex->reserved = -1;
     }
   }
