@@ -124,8 +124,10 @@ TV_API tv_status tv_room_add(tv_room *room, const tv_camera *camera, const doubl
 /* Removes a map that was added with the same camera, pose R and t, and contents: the sums are then
    those of a room to which it was never added, bit for bit. TV_ERR_ARGUMENT where the room holds no
    map of these arguments: none was added, it was removed already, or tv_room_coarsen has fixed it.
-   Takes the time of tv_room_add, and returns its statuses except TV_ERR_CAPACITY and TV_ERR_LIMITS.
- */
+   How many maps saw through a voxel is counted since its block was made: where a removal leaves no
+   surface in a block, the block is freed with these counts. Takes the time of tv_room_add.
+   Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (the map or R, or no such map),
+   TV_ERR_NOT_FINITE (R or t), TV_ERR_CAMERA. */
 TV_API tv_status tv_room_remove(tv_room *room, const tv_camera *camera, const double R[9],
                                 const double t[3], const tv_depth_map *map);
 
@@ -136,8 +138,10 @@ TV_API tv_status tv_room_coarsen(tv_room *room);
 
 /* Lets a map that the room holds see through the blocks that were made since it was added, as if it
    were added after them. What was inferred has to stand up to this: call it for each map after the
-   inferred ones were added. Takes the time of tv_room_add at most, and returns the statuses of
-   tv_room_remove. */
+   inferred ones were added. The map is named by the camera, the pose R and t, and the contents with
+   which it was added. Takes the time of tv_room_add at most.
+   Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (the map or R, or the room holds no such
+   map), TV_ERR_NOT_FINITE (R or t), TV_ERR_CAMERA. */
 TV_API tv_status tv_room_see_through(tv_room *room, const tv_camera *camera, const double R[9],
                                      const double t[3], const tv_depth_map *map);
 
@@ -247,7 +251,7 @@ typedef struct tv_room_plane {
   double normal[3];
   /* normal . x of its points, in the unit of the poses. */
   double offset;
-  /* The middle of what was measured of it. */
+  /* The middle of what was measured of it, in the unit of the poses. */
   double centre[3];
   /* How much was measured of it, in squares of the unit. */
   double area;
