@@ -28,12 +28,13 @@ from .camera_files import (FILM, PLAIN_FILE, CalibrationSigmas, FormatError, for
                            parse_cameras, read_camera, read_cameras, read_sigmas, write_cameras)
 from .context import Context
 from .dense import densify
+from .depth_map import DepthMap, sweep_depth
 from .enums import (CameraModel, Kernels, Kind, Loss, Normalisation, OdometryStatus, Orientation,
                     PointStatus, Purpose, Reason, RoomPlaneKind, ScaleSource, Solver,
                     Stage, Status, Triangulation, Verdict)
 from .odometry import Keyframe, Odometry, OdometryState
-from .options import (AbsolutePoseOptions, BundleOptions, DenseOptions, EstimateOptions,
-                      FeatureOptions, GuidedOptions, MatchOptions, OdometryOptions,
+from .options import (AbsolutePoseOptions, BundleOptions, DenseOptions, DepthOptions,
+                      EstimateOptions, FeatureOptions, GuidedOptions, MatchOptions, OdometryOptions,
                       RoomInferOptions, RoomMeshOptions,
                       RoomOptions, RoomPlaneOptions, WindowOptions)
 from .room import ROOM_DEFAULT_BYTES, Room, RoomMesh, RoomState
@@ -64,23 +65,23 @@ if not _typing.TYPE_CHECKING:  # or a type checker would accept every unknown na
 __all__ = [
     "AbsolutePose", "AbsolutePoseOptions", "BundleOptions", "BundleResult", "CORRESPONDENCE",
     "CalibrationSigmas", "Camera", "CameraModel", "Context", "DENSE_POINT", "DESCRIPTOR_BYTES",
-    "DISTANCE_PRIOR", "DenseOptions", "EstimateOptions", "FILM", "FeatureOptions", "FormatError",
-    "GRAVITY_PRIOR", "GuidedOptions", "KEYPOINT", "Kernels", "Keyframe", "Kind", "Library",
-    "Loss", "MAP_OBSERVATION", "MAP_POINT", "MatchOptions", "Normalisation", "OBSERVATION",
-    "Odometry", "OdometryOptions", "OdometryState", "OdometryStatus", "Orientation",
-    "PLAIN_FILE", "POINT", "POSE_PRIOR", "PointStatus", "Purpose", "ROOM_DEFAULT_BYTES",
-    "ROOM_PLANE", "ROOM_VERTEX", "Reason", "Reconstruction", "Room", "RoomInferOptions",
-    "RoomMesh", "RoomMeshOptions", "RoomOptions", "RoomPlaneKind", "RoomPlaneOptions",
-    "RoomState",
-    "ScaleSource", "Solver", "Stage", "Status", "StatusError", "TV_ERR_ALIGNMENT",
-    "TV_ERR_ARGUMENT", "TV_ERR_CAMERA", "TV_ERR_CAPACITY", "TV_ERR_KERNELS", "TV_ERR_LIMITS",
-    "TV_ERR_MAP", "TV_ERR_MEMORY", "TV_ERR_NOT_FINITE", "TV_ERR_NULL", "TV_ERR_OUTSIDE",
-    "TV_ERR_OVERLAP", "TV_ERR_STRUCT_SIZE", "Triangulation", "TwoView", "Verdict",
-    "WINDOW_VIEW", "WindowOptions", "WindowResult", "adjust_two_view", "adjust_window",
-    "align_matches", "camera_check", "camera_project_points", "camera_scale", "camera_undistort",
-    "camera_unproject_points", "camera_valid_angle", "correct_matches", "corrected_camera",
-    "default_library", "densify", "describe", "detect", "estimate_absolute_pose",
-    "estimate_two_view", "extract", "format_cameras", "keypoint_sigmas", "match", "match_guided",
-    "orient", "parse_cameras", "point_covariances", "read_camera", "read_cameras", "read_sigmas",
-    "reconstruct", "triangulate", "version_string", "write_cameras",
+    "DISTANCE_PRIOR", "DenseOptions", "DepthMap", "DepthOptions", "EstimateOptions", "FILM",
+    "FeatureOptions", "FormatError", "GRAVITY_PRIOR", "GuidedOptions", "KEYPOINT", "Kernels",
+    "Keyframe", "Kind", "Library", "Loss", "MAP_OBSERVATION", "MAP_POINT", "MatchOptions",
+    "Normalisation", "OBSERVATION", "Odometry", "OdometryOptions", "OdometryState",
+    "OdometryStatus", "Orientation", "PLAIN_FILE", "POINT", "POSE_PRIOR", "PointStatus",
+    "Purpose", "ROOM_DEFAULT_BYTES", "ROOM_PLANE", "ROOM_VERTEX", "Reason", "Reconstruction",
+    "Room", "RoomInferOptions", "RoomMesh", "RoomMeshOptions", "RoomOptions", "RoomPlaneKind",
+    "RoomPlaneOptions", "RoomState", "ScaleSource", "Solver", "Stage", "Status", "StatusError",
+    "TV_ERR_ALIGNMENT", "TV_ERR_ARGUMENT", "TV_ERR_CAMERA", "TV_ERR_CAPACITY", "TV_ERR_KERNELS",
+    "TV_ERR_LIMITS", "TV_ERR_MAP", "TV_ERR_MEMORY", "TV_ERR_NOT_FINITE", "TV_ERR_NULL",
+    "TV_ERR_OUTSIDE", "TV_ERR_OVERLAP", "TV_ERR_STRUCT_SIZE", "Triangulation", "TwoView",
+    "Verdict", "WINDOW_VIEW", "WindowOptions", "WindowResult", "adjust_two_view",
+    "adjust_window", "align_matches", "camera_check", "camera_project_points", "camera_scale",
+    "camera_undistort", "camera_unproject_points", "camera_valid_angle", "correct_matches",
+    "corrected_camera", "default_library", "densify", "describe", "detect",
+    "estimate_absolute_pose", "estimate_two_view", "extract", "format_cameras",
+    "keypoint_sigmas", "match", "match_guided", "orient", "parse_cameras", "point_covariances",
+    "read_camera", "read_cameras", "read_sigmas", "reconstruct", "sweep_depth", "triangulate",
+    "version_string", "write_cameras",
 ]

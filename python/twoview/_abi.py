@@ -279,6 +279,22 @@ class tv_dense_point(Structure):
                 ("sigma", c_float), ("similarity", c_float), ("grey", c_int32)]
 
 
+class tv_depth_options(Structure):
+    _fields_ = [("struct_size", c_uint32), ("max_pixels", c_int32), ("max_planes", c_int32),
+                ("max_views", c_int32), ("near_depth", c_double), ("far_depth", c_double),
+                ("max_relative_sigma", c_double)]
+
+
+class tv_depth_view(Structure):
+    _fields_ = [("image", tv_image), ("camera", c_void_p),
+                ("world_from_cam_R", c_double * 9), ("world_from_cam_t", c_double * 3)]
+
+
+class tv_depth_arrays(Structure):
+    _fields_ = [("distance", c_void_p), ("sigma", c_void_p), ("witnesses", c_void_p),
+                ("grey", c_void_p)]
+
+
 class tv_room_options(Structure):
     _fields_ = [("struct_size", c_uint32), ("truncation_voxels", c_int32), ("voxel", c_double),
                 ("max_distance", c_double)]
@@ -335,6 +351,7 @@ STRUCTS = [tv_limits, tv_image, tv_camera, tv_keypoint, tv_features, tv_feature_
            tv_pose_prior, tv_gravity_prior, tv_distance_prior, tv_window, tv_window_options,
            tv_window_result, tv_odometry_options, tv_odometry_frame, tv_odometry_state,
            tv_keyframe, tv_map_point, tv_map_observation, tv_dense_options, tv_dense_point,
+           tv_depth_options, tv_depth_view, tv_depth_arrays,
            tv_room_options, tv_depth_map, tv_room_state, tv_room_vertex, tv_room_triangle,
            tv_room_mesh_options, tv_room_plane, tv_room_plane_options, tv_room_infer_options]
 
@@ -439,7 +456,7 @@ class Library:
         try:
             return getattr(self.lib, name)
         except AttributeError:
-            part = ("TWOVIEW_DENSE" if "dens" in name else
+            part = ("TWOVIEW_DENSE" if "dens" in name or "depth" in name else
                     "TWOVIEW_ROOM" if "room" in name else "TWOVIEW_ODOMETRY")
             raise NotImplementedError(f"{self.path} has no {name}: it was built with {part}=OFF, "
                                       "or is of an older release") from None

@@ -150,6 +150,18 @@ class DenseOptions:
 
 
 @dataclass(frozen=True)
+class DepthOptions:
+    """The options of sweep_depth, as in tv_depth_options."""
+
+    max_pixels: int = 76800  #: most pixels of the map, [1024, 4194304]
+    max_planes: int = 96  #: most planes of equal inverse depth, [16, 256]
+    max_views: int = 5  #: most views, the reference included, [2, 7]
+    near_depth: float = 0.0  #: the range along the optical axis that is searched, in the unit
+    far_depth: float = 0.0  #: of the poses; has no default
+    max_relative_sigma: float = 0.05  #: largest sigma of a distance, as a share of it
+
+
+@dataclass(frozen=True)
 class RoomOptions:
     """The options of a Room, as in tv_room_options."""
 
@@ -191,7 +203,8 @@ _STRUCTS = {FeatureOptions: _abi.tv_feature_options, MatchOptions: _abi.tv_match
             BundleOptions: _abi.tv_bundle_options,
             AbsolutePoseOptions: _abi.tv_absolute_pose_options,
             WindowOptions: _abi.tv_window_options, OdometryOptions: _abi.tv_odometry_options,
-            DenseOptions: _abi.tv_dense_options, RoomOptions: _abi.tv_room_options,
+            DenseOptions: _abi.tv_dense_options,
+            DepthOptions: _abi.tv_depth_options, RoomOptions: _abi.tv_room_options,
             RoomMeshOptions: _abi.tv_room_mesh_options,
             RoomPlaneOptions: _abi.tv_room_plane_options,
             RoomInferOptions: _abi.tv_room_infer_options}

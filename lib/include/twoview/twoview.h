@@ -7,6 +7,7 @@
 #include "twoview/camera.h"
 #include "twoview/context.h"
 #include "twoview/dense.h"
+#include "twoview/depth_map.h"
 #include "twoview/feature.h"
 #include "twoview/image.h"
 #include "twoview/match.h"

@@ -16,6 +16,7 @@ LIBRARY = [
     "two_view",
     "triangulate",
     "dense",
+    "depth_map",
     "room",
     "bundle",
     "absolute_pose",
