@@ -47,9 +47,10 @@ def cameras(count=40):
         lens = list(tv.CameraModel)[i % 3]
         num = {tv.CameraModel.PINHOLE: 0, tv.CameraModel.BROWN_CONRADY: dice.choice((1, 4, 5, 8)),
                tv.CameraModel.KANNALA_BRANDT: 4}[lens]
-        yield tv.Camera(dice.randint(64, 4000), dice.randint(64, 3000), dice.uniform(50, 3000),
-                        dice.uniform(50, 3000), dice.uniform(30, 2000), dice.uniform(-30, 2000),
-                        lens, tuple(dice.uniform(-0.1, 0.1) for _ in range(num)))
+        width, height = dice.randint(64, 4000), dice.randint(64, 3000)
+        yield tv.Camera(width, height, dice.uniform(0.1, 9) * width, dice.uniform(0.1, 9) * height,
+                        dice.uniform(-0.9, 1.9) * width, dice.uniform(-0.9, 1.9) * height, lens,
+                        tuple(dice.uniform(-0.1, 0.1) for _ in range(num)))
 
 
 def fits(camera, format):
@@ -166,6 +167,29 @@ def test_colmap_reads_what_is_written(tmp_path):
         assert inside.all() and np.abs(theirs - 0.5 - pixels).max() < 1e-6
     again = tv.read_cameras(tmp_path / "cameras.txt")
     assert list(again) == list(given)
+
+
+def test_the_camera_of_the_same_picture_at_another_size(tmp_path):
+    camera = tv.Camera(1280, 960, 1000, 1010, 639.5, 479.5, tv.CameraModel.BROWN_CONRADY, (0.1,))
+    half = tv.Camera(640, 480, 500, 505, 319.5, 239.5, tv.CameraModel.BROWN_CONRADY, (0.1,))
+    assert camera.scaled(640, 480) == half and half.scaled(1280, 960) == camera
+    assert camera.scaled(1280, 960) == camera
+    assert tv.Camera(1920, 1080, 900, 900, 960, 540).scaled(854, 480).width == 854  # 853.33
+    tv.write_cameras(tmp_path / "camera", camera)
+    assert tv.read_camera(tmp_path / "camera", scale_to=(640, 480)) == half
+    for size in ((640, 360), (0, 0), (1280, 720)):
+        with pytest.raises(ValueError, match=f"{size[0]}x{size[1]}"):
+            camera.scaled(*size)
+
+
+def test_what_is_left_out_is_named(tmp_path):
+    (tmp_path / "c").write_text("image_width: 64\nimage_height: 48\nweather: fine\nrms: 0.2\n"
+                                "K: [50, 0, 32, 0, 50, 24, 0, 0, 1]\n"
+                                "P: [40, 0, 32, 0, 0, 40, 24, 0, 0, 0, 1, 0]\n")
+    with pytest.warns(tv.CameraFileWarning) as warned:
+        tv.read_camera(tmp_path / "c")
+    assert [str(w.message).split(": ", 1)[1] for w in warned] == [
+        "left out: P (of rectified pictures), weather"]
 
 
 # ---- bad input -----------------------------------------------------------------------------------

@@ -24,8 +24,9 @@ from ._abi import (CORRESPONDENCE, DENSE_POINT, DESCRIPTOR_BYTES, DISTANCE_PRIOR
 from .absolute_pose import AbsolutePose, estimate_absolute_pose
 from .camera import (Camera, camera_check, camera_project_points, camera_scale,
                      camera_undistort, camera_unproject_points, camera_valid_angle)
-from .camera_files import (FILM, PLAIN_FILE, CalibrationSigmas, FormatError, format_cameras,
-                           parse_cameras, read_camera, read_cameras, read_sigmas, write_cameras)
+from .camera_files import (FILM, PLAIN_FILE, CalibrationSigmas, CameraFileWarning, FormatError,
+                           format_cameras, parse_cameras, read_camera, read_cameras, read_sigmas,
+                           write_cameras)
 from .context import Context
 from .dense import densify
 from .depth_map import DepthMap, sweep_depth
@@ -64,24 +65,24 @@ if not _typing.TYPE_CHECKING:  # or a type checker would accept every unknown na
 # A type checker reads this list; a test compares it with the imports above.
 __all__ = [
     "AbsolutePose", "AbsolutePoseOptions", "BundleOptions", "BundleResult", "CORRESPONDENCE",
-    "CalibrationSigmas", "Camera", "CameraModel", "Context", "DENSE_POINT", "DESCRIPTOR_BYTES",
-    "DISTANCE_PRIOR", "DenseOptions", "DepthMap", "DepthOptions", "EstimateOptions", "FILM",
-    "FeatureOptions", "FormatError", "GRAVITY_PRIOR", "GuidedOptions", "KEYPOINT", "Kernels",
-    "Keyframe", "Kind", "Library", "Loss", "MAP_OBSERVATION", "MAP_POINT", "MatchOptions",
-    "Normalisation", "OBSERVATION", "Odometry", "OdometryOptions", "OdometryState",
-    "OdometryStatus", "Orientation", "PLAIN_FILE", "POINT", "POSE_PRIOR", "PointStatus",
-    "Purpose", "ROOM_DEFAULT_BYTES", "ROOM_PLANE", "ROOM_VERTEX", "Reason", "Reconstruction",
-    "Room", "RoomInferOptions", "RoomMesh", "RoomMeshOptions", "RoomOptions", "RoomPlaneKind",
-    "RoomPlaneOptions", "RoomState", "ScaleSource", "Solver", "Stage", "Status", "StatusError",
-    "TV_ERR_ALIGNMENT", "TV_ERR_ARGUMENT", "TV_ERR_CAMERA", "TV_ERR_CAPACITY", "TV_ERR_KERNELS",
-    "TV_ERR_LIMITS", "TV_ERR_MAP", "TV_ERR_MEMORY", "TV_ERR_NOT_FINITE", "TV_ERR_NULL",
-    "TV_ERR_OUTSIDE", "TV_ERR_OVERLAP", "TV_ERR_STRUCT_SIZE", "Triangulation", "TwoView",
-    "Verdict", "WINDOW_VIEW", "WindowOptions", "WindowResult", "adjust_two_view",
-    "adjust_window", "align_matches", "camera_check", "camera_project_points", "camera_scale",
+    "CalibrationSigmas", "Camera", "CameraFileWarning", "CameraModel", "Context",
+    "DENSE_POINT", "DESCRIPTOR_BYTES", "DISTANCE_PRIOR", "DenseOptions", "DepthMap",
+    "DepthOptions", "EstimateOptions", "FILM", "FeatureOptions", "FormatError",
+    "GRAVITY_PRIOR", "GuidedOptions", "KEYPOINT", "Kernels", "Keyframe", "Kind", "Library",
+    "Loss", "MAP_OBSERVATION", "MAP_POINT", "MatchOptions", "Normalisation", "OBSERVATION",
+    "Odometry", "OdometryOptions", "OdometryState", "OdometryStatus", "Orientation",
+    "PLAIN_FILE", "POINT", "POSE_PRIOR", "PointStatus", "Purpose", "ROOM_DEFAULT_BYTES",
+    "ROOM_PLANE", "ROOM_VERTEX", "Reason", "Reconstruction", "Room", "RoomInferOptions",
+    "RoomMesh", "RoomMeshOptions", "RoomOptions", "RoomPlaneKind", "RoomPlaneOptions",
+    "RoomState", "ScaleSource", "Solver", "Stage", "Status", "StatusError", "TV_ERR_ALIGNMENT",
+    "TV_ERR_ARGUMENT", "TV_ERR_CAMERA", "TV_ERR_CAPACITY", "TV_ERR_KERNELS", "TV_ERR_LIMITS",
+    "TV_ERR_MAP", "TV_ERR_MEMORY", "TV_ERR_NOT_FINITE", "TV_ERR_NULL", "TV_ERR_OUTSIDE",
+    "TV_ERR_OVERLAP", "TV_ERR_STRUCT_SIZE", "Triangulation", "TwoView", "Verdict",
+    "WINDOW_VIEW", "WindowOptions", "WindowResult", "adjust_two_view", "adjust_window",
+    "align_matches", "camera_check", "camera_project_points", "camera_scale",
     "camera_undistort", "camera_unproject_points", "camera_valid_angle", "correct_matches",
     "corrected_camera", "default_library", "densify", "describe", "detect",
     "estimate_absolute_pose", "estimate_two_view", "extract", "format_cameras",
     "keypoint_sigmas", "match", "match_guided", "orient", "parse_cameras", "point_covariances",
     "read_camera", "read_cameras", "read_sigmas", "reconstruct", "sweep_depth", "triangulate",
-    "version_string", "write_cameras",
-]
+    "version_string", "write_cameras"]

@@ -58,6 +58,24 @@ class Camera:
         """The 3x3 matrix [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]."""
         return np.array([[self.fx, 0, self.cx], [0, self.fy, self.cy], [0, 0, 1]])
 
+    def scaled(self, width: int, height: int) -> Camera:
+        """The camera of the same picture at another size, as --scale-camera makes it: on each axis,
+        with s = new size / old size, f' = s f and c' = s (c + 0.5) - 0.5.
+
+        width, height: of the picture, pixels.
+        Returns a Camera. Raises ValueError for another shape (a crop), where no scale gives both
+        sides to within a pixel, and for a side below 1."""
+        if width < 1 or height < 1:
+            raise ValueError(f"{width}x{height} is no size of a picture")
+        if (abs(height - width * self.height / self.width) >= 1
+                and abs(width - height * self.width / self.height) >= 1):
+            raise ValueError(f"{width}x{height} has not the shape of this camera's "
+                             f"{self.width}x{self.height}: a crop, or another mode of the sensor, "
+                             "has a camera of its own")
+        sx, sy = width / self.width, height / self.height
+        return Camera(width, height, sx * self.fx, sy * self.fy, sx * (self.cx + 0.5) - 0.5,
+                      sy * (self.cy + 0.5) - 0.5, self.model, self.k)
+
 
 def camera_struct(name: str, camera: Any) -> Any:
     if isinstance(camera, _abi.tv_camera):

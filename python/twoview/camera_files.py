@@ -1,8 +1,11 @@
-"""Camera files: reads OpenCV's YAML and XML, ROS's camera_info, Kalibr's camchain, a data set's
-cameras.yaml and COLMAP's cameras.txt, and writes all of them.
+"""Camera files: reads OpenCV's YAML, JSON and XML, ROS's camera_info, Kalibr's camchain,
+ORB-SLAM's, stella_vslam's and VINS's settings, nerfstudio's transforms.json, a data set's
+cameras.yaml and COLMAP's cameras.txt, and writes OpenCV's, ROS's, Kalibr's, cameras.yaml and
+COLMAP's.
 
 The program reads camera files by the same rules (tools/twoview/files/camera_formats.h), and both
-are tested on the cases of test/formats. YAML needs the package PyYAML."""
+are tested on the cases of test/formats. YAML needs the package PyYAML. _camera_entries has the
+names of the entries, and says which of them are refused."""
 
 from __future__ import annotations
 
@@ -11,53 +14,28 @@ import importlib
 import math
 import os
 import re
-from typing import Any, Callable, Iterator, Mapping, NamedTuple, Optional, Sequence, Union
+import warnings
+from typing import Any, Callable, Mapping, NamedTuple, Optional, Sequence, Union
 
+from ._camera_entries import (COEFFICIENTS, NUM_MODELLED, Entries, checked_camera, is_camera,
+                              number_of, plain, refuse, side_of, sigmas_of, take_camera, word_of)
+from ._camera_entries import FormatError as FormatError
+from ._camera_entries import parse_number as parse_number
 from .camera import Camera, camera_check
 from .enums import CameraModel
 
 MAX_FILE_BYTES = 1 << 20
 PathLike = Union[str, "os.PathLike[str]"]
-KNOWN = ("; camera files are OpenCV's or ROS's YAML or XML (camera_matrix or K), Kalibr's "
-         "(intrinsics), a cameras.yaml (fx fy cx cy) and COLMAP's cameras.txt")
-
-_NUM_MODELLED = 8  # coefficients k1 k2 p1 p2 k3 k4 k5 k6 of a Camera
-_OPENCV_COUNTS = (0, 4, 5, 8, 12, 14)
-# The names of an entry: of OpenCV's and ROS's files, of ROS 1's message and of ROS 2's.
-_MATRIX = ("camera_matrix", "K", "k")
-_DISTORTION = ("distortion_coefficients", "D", "d")
-_WIDTH, _HEIGHT = ("image_width", "width"), ("image_height", "height")
-_COEFFICIENTS = ("k1", "k2", "p1", "p2", "k3")  # of a cameras.yaml
-# The lens for each distortion_model of an OpenCV or ROS file. None: there is no such entry; "": it
-# is empty.
-_LENSES = {None: CameraModel.BROWN_CONRADY, "": CameraModel.BROWN_CONRADY,
-           "none": CameraModel.PINHOLE, "plumb_bob": CameraModel.BROWN_CONRADY,
-           "rational_polynomial": CameraModel.BROWN_CONRADY,
-           "equidistant": CameraModel.KANNALA_BRANDT}
-_KALIBR_LENSES = {"radtan": CameraModel.BROWN_CONRADY, "plumb_bob": CameraModel.BROWN_CONRADY,
-                  "radial-tangential": CameraModel.BROWN_CONRADY,
-                  "equidistant": CameraModel.KANNALA_BRANDT}
-# COLMAP's models: the lens, which parameters are fx fy cx cy, and how many coefficients follow.
-_COLMAP = {
-    "SIMPLE_PINHOLE": (CameraModel.PINHOLE, (0, 0, 1, 2), 0),
-    "PINHOLE": (CameraModel.PINHOLE, (0, 1, 2, 3), 0),
-    "SIMPLE_RADIAL": (CameraModel.BROWN_CONRADY, (0, 0, 1, 2), 1),
-    "RADIAL": (CameraModel.BROWN_CONRADY, (0, 0, 1, 2), 2),
-    "OPENCV": (CameraModel.BROWN_CONRADY, (0, 1, 2, 3), 4),
-    "FULL_OPENCV": (CameraModel.BROWN_CONRADY, (0, 1, 2, 3), 8),
-    "SIMPLE_RADIAL_FISHEYE": (CameraModel.KANNALA_BRANDT, (0, 0, 1, 2), 1),
-    "RADIAL_FISHEYE": (CameraModel.KANNALA_BRANDT, (0, 0, 1, 2), 2),
-    "OPENCV_FISHEYE": (CameraModel.KANNALA_BRANDT, (0, 1, 2, 3), 4),
-}
-_COLMAP_HALF_PIXEL = 0.5  # COLMAP's origin is the corner of the first pixel
-
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE | re.ASCII)
-_NOT_FINITE = re.compile(r"[+-]?\.?(nan|inf|infinity)", re.IGNORECASE)
+KNOWN = ("; camera files are OpenCV's or ROS's YAML, JSON or XML (camera_matrix or K), Kalibr's "
+         "(intrinsics), ORB-SLAM's (Camera.fx), VINS's (projection_parameters), nerfstudio's "
+         "(fl_x), a cameras.yaml (fx fy cx cy) and COLMAP's cameras.txt")
+_WRITE_OURS = ("write its numbers as OpenCV's YAML: image_width, image_height, camera_matrix, "
+               "distortion_coefficients (docs/formats.md)")
+HALF_PIXEL = 0.5  # the origin of COLMAP and nerfstudio is the corner of the first pixel
 
 
-class FormatError(ValueError):
-    """A file that is refused. The message is one line that names the file and the entry, and the
-    formats that are known where none is recognised."""
+class CameraFileWarning(UserWarning):
+    """Entries of a camera file that were left out, since they cannot concern the lens."""
 
 
 class CalibrationSigmas(NamedTuple):
@@ -74,18 +52,6 @@ PLAIN_FILE, FILM = CalibrationSigmas(0.01, 0.005), CalibrationSigmas(0.1, 0.01)
 
 
 # ---- text, YAML and XML --------------------------------------------------------------------------
-
-def parse_number(text: str) -> float:
-    """A finite number. FormatError gives the reason if `text` is not one."""
-    if _NUMBER.fullmatch(text):
-        value = float(text)
-        is_zero = not re.search("[1-9]", re.split("[eE]", text)[0])
-        if math.isfinite(value) and (value != 0 or is_zero):
-            return value
-    if _NOT_FINITE.fullmatch(text):
-        raise FormatError("is not finite")
-    raise FormatError("is no number")
-
 
 def read_text(path: PathLike, most_bytes: int = MAX_FILE_BYTES) -> str:
     """The text of a file. Bytes that are not UTF-8 are preserved, since they may be part of a file
@@ -115,15 +81,19 @@ def _value(yaml: Any, node: Any, name: str) -> Any:
 
 
 def parse_yaml(text: str, name: str) -> dict[str, Any]:
-    """The first document of a YAML text; FormatError if it is no map."""
+    """The first document of a YAML or JSON text; FormatError if it is no map."""
     try:
         yaml: Any = importlib.import_module("yaml")  # needed here only
     except ImportError:
         raise ImportError("reading a camera file needs the package PyYAML (pip install pyyaml, or "
                           "apt install python3-yaml)") from None
     text = text[1:] if text.startswith("\ufeff") else text
-    if text.startswith("%YAML:"):  # '%YAML:1.0', OpenCV's first line, is no valid YAML
+    # OpenCV's first line, '%YAML:1.0', is no valid YAML; '%YAML 1.2', of OpenCV 5, is none that
+    # PyYAML knows.
+    if text.startswith("%YAML"):
         text = "#" + text[1:]
+    if text.lstrip().startswith("{"):  # JSON may be indented by tabs, YAML may not
+        text = text.replace("\t", " ")
     try:
         for event in yaml.parse(text, yaml.BaseLoader):
             if isinstance(event, yaml.AliasEvent):
@@ -141,6 +111,23 @@ def parse_yaml(text: str, name: str) -> dict[str, Any]:
     return values
 
 
+def _xml_value(element: Any, name: str) -> Any:
+    """An element of OpenCV's XML as YAML would give it: a map, a list or a word."""
+    content = (element.text or "").strip()
+    if len(element) == 0:
+        is_list = not content.startswith('"') and (
+            element.tag in ("data", "sizes") or len(content.split()) > 1)
+        return content.split() if is_list else content.strip('"') or None
+    if all(part.tag == "_" for part in element):
+        return [_xml_value(part, name) for part in element]
+    values: dict[str, Any] = {}
+    for part in element:
+        if part.tag in values:
+            raise FormatError(f"{name}: {part.tag} is given twice")
+        values[part.tag] = _xml_value(part, name)
+    return values
+
+
 def _parse_xml(text: str, name: str) -> dict[str, Any]:
     """OpenCV's XML as parse_yaml gives its YAML: a matrix is a map with rows, cols and data."""
     import xml.etree.ElementTree as ElementTree
@@ -151,206 +138,60 @@ def _parse_xml(text: str, name: str) -> dict[str, Any]:
     except ElementTree.ParseError as error:
         raise FormatError(f"{name}: no XML: {error}") from None
     if root.tag != "opencv_storage":
-        raise FormatError(f"{name}: XML of {root.tag[:40]}, not OpenCV's opencv_storage")
-    values: dict[str, Any] = {}
-    for entry in root:
-        if entry.tag in values:
-            raise FormatError(f"{name}: {entry.tag} is given twice")
-        inner: dict[str, Any] = {part.tag: (part.text or "").strip() for part in entry}
-        if "data" in inner:
-            inner["data"] = inner["data"].split()
-        content = (entry.text or "").strip()
-        values[entry.tag] = inner or content.strip('"') or None
-    return values
-
-
-def _finite(value: Any, entry: str, where: str) -> float:
-    try:
-        return parse_number(value if isinstance(value, str) else "")
-    except FormatError as error:
-        raise FormatError(f"{where}: {entry} {error}") from None
-
-
-def _at(values: Mapping[str, Any], entry: str, where: str) -> Any:
-    if values.get(entry) is None:
-        raise FormatError(f"{where}: {entry} is missing")
-    return values[entry]
-
-
-def _number_at(values: Mapping[str, Any], entry: str, where: str) -> float:
-    return _finite(_at(values, entry, where), entry, where)
-
-
-def _side(value: float, entry: str, where: str) -> int:
-    if value == 0:
-        raise FormatError(f"{where}: {entry} is 0")
-    if value != math.floor(value) or not 1 <= value <= 1e6:
-        raise FormatError(f"{where}: {entry} is not a number of pixels")
-    return int(value)
-
-
-def _check_focal(value: float, entry: str, where: str) -> None:
-    if value <= 0:
-        raise FormatError(f"{where}: {entry} is {'negative' if value < 0 else '0'}")
-
-
-def _flat(values: list[Any], entry: str, where: str) -> Iterator[float]:
-    for i, value in enumerate(values):
-        name = f"{entry}[{i}]"
-        if isinstance(value, list):
-            yield from _flat(value, name, where)
-        else:
-            yield _finite(value, name, where)
-
-
-def _numbers_at(values: Mapping[str, Any], entry: str, where: str) -> list[float]:
-    """The numbers of an entry: a list, a list of lists, or a map with data."""
-    node = _at(values, entry, where)
-    listed = node
-    if isinstance(node, dict):
-        if "data" not in node:
-            raise FormatError(f"{where}: {entry} has no data")
-        listed = node["data"]
-    if not isinstance(listed, list):
-        raise FormatError(f"{where}: {entry} is not a list of numbers")
-    found = list(_flat(listed, entry, where))
-    if isinstance(node, dict) and "rows" in node and "cols" in node:
-        rows, cols = (_number_at(node, side, f"{where}: {entry}") for side in ("rows", "cols"))
-        if rows * cols != len(found):
-            raise FormatError(f"{where}: {entry} has {len(found)} numbers, not rows x cols = "
-                              f"{node['rows']} x {node['cols']}")
-    return found
-
-
-def _word_at(values: Mapping[str, Any], entry: str, where: str) -> Optional[str]:
-    word = values.get(entry)
-    if isinstance(word, (list, dict)):
-        raise FormatError(f"{where}: {entry} is not a word")
-    return word
-
-
-def _counted(values: list[float], count: int, entry: str, where: str) -> list[float]:
-    if len(values) != count:
-        raise FormatError(f"{where}: {entry} has {len(values)} numbers, not {count}")
-    return values
-
-
-def _camera(width: int, height: int, K: tuple[float, float, float, float], lens: CameraModel,
-            k: Sequence[float]) -> Camera:
-    # An equidistant lens with four zero coefficients is no pinhole.
-    if lens == CameraModel.BROWN_CONRADY and not any(k):
-        lens = CameraModel.PINHOLE
-    return Camera(width, height, *K, lens, () if lens == CameraModel.PINHOLE else tuple(k))
-
-
-# ---- OpenCV and ROS ------------------------------------------------------------------------------
-
-def _name_in(root: Mapping[str, Any], names: tuple[str, ...]) -> str:
-    """The first of the names that the file has; without any the first, which messages name."""
-    return next((name for name in names if root.get(name) is not None), names[0])
-
-
-def _camera_matrix(root: Mapping[str, Any], where: str) -> tuple[float, float, float, float]:
-    entry = _name_in(root, _MATRIX)
-    K = _counted(_numbers_at(root, entry, where), 9, entry, where)
-    node = root[entry]
-    for side in ("rows", "cols") if isinstance(node, dict) else ():
-        if side in node and _number_at(node, side, f"{where}: {entry}") != 3:
-            raise FormatError(f"{where}: {entry}: {side} is not 3")
-    _check_focal(K[0], f"fx ({entry}[0])", where)
-    _check_focal(K[4], f"fy ({entry}[4])", where)
-    if K[1]:
-        raise FormatError(f"{where}: {entry}[1] is not 0; skew is not supported")
-    if K[3] or K[6:] != [0, 0, 1]:
-        raise FormatError(f"{where}: {entry} is not [fx 0 cx; 0 fy cy; 0 0 1]")
-    return K[0], K[4], K[2], K[5]
-
-
-def _distortion(root: Mapping[str, Any], where: str) -> tuple[CameraModel, list[float]]:
-    word = _word_at(root, "distortion_model", where)
-    if word not in _LENSES:
-        raise FormatError(f"{where}: distortion_model '{word}' is not one of plumb_bob, "
-                          "rational_polynomial, equidistant")
-    entry = _name_in(root, _DISTORTION)
-    if root.get(entry) is None or word == "none":
-        if word in (None, "", "none"):
-            return CameraModel.PINHOLE, []
-        raise FormatError(f"{where}: {entry} is missing")
-    k = _numbers_at(root, entry, where)
-    is_fisheye = word == "equidistant"
-    if len(k) not in ((4,) if is_fisheye else _OPENCV_COUNTS):
-        raise FormatError(f"{where}: {entry} has {len(k)} numbers, not "
-                          + ("4" if is_fisheye else "4, 5, 8, 12 or 14"))
-    for i, value in enumerate(k[_NUM_MODELLED:], _NUM_MODELLED):
-        if value:
-            raise FormatError(f"{where}: {entry} has {len(k)} numbers, of which {entry}[{i}] is "
-                              "not 0: the lens models here end with the first 8 (no thin prism, no "
-                              "tilted sensor); calibrate with 5 or 8")
-    return _LENSES[word], k[:_NUM_MODELLED]
-
-
-def camera_of(root: Mapping[str, Any], where: str) -> Camera:
-    """The camera of a parsed OpenCV or ROS file. `where` is used in messages."""
-    width, height = (_side(_number_at(root, side, where), side, where)
-                     for side in (_name_in(root, _WIDTH), _name_in(root, _HEIGHT)))
-    K = _camera_matrix(root, where)
-    return _camera(width, height, K, *_distortion(root, where))
-
-
-# ---- Kalibr --------------------------------------------------------------------------------------
-
-def _is_kalibr(node: Any) -> bool:
-    return isinstance(node, dict) and "intrinsics" in node
-
-
-def _kalibr_camera(node: Mapping[str, Any], where: str) -> Camera:
-    """A camera of a camchain, and EuRoC's sensor.yaml, which has the same entries."""
-    model = _word_at(node, "camera_model", where)
-    if model and model != "pinhole":
-        raise FormatError(f"{where}: camera_model '{model}' is not pinhole")
-    fx, fy, cx, cy = _counted(_numbers_at(node, "intrinsics", where), 4, "intrinsics", where)
-    sides = _counted(_numbers_at(node, "resolution", where), 2, "resolution", where)
-    width, height = (_side(side, f"resolution[{i}]", where) for i, side in enumerate(sides))
-    _check_focal(fx, "fx (intrinsics[0])", where)
-    _check_focal(fy, "fy (intrinsics[1])", where)
-    word = _word_at(node, "distortion_model", where)
-    if not word or word == "none":
-        return _camera(width, height, (fx, fy, cx, cy), CameraModel.PINHOLE, ())
-    if word not in _KALIBR_LENSES:
-        raise FormatError(f"{where}: distortion_model '{word}' is not one of radtan, equidistant, "
-                          "none")
-    entry = "distortion_coeffs" if "distortion_coeffs" in node else "distortion_coefficients"
-    k = _counted(_numbers_at(node, entry, where), 4, entry, where)
-    return _camera(width, height, (fx, fy, cx, cy), _KALIBR_LENSES[word], k)
-
-
-# ---- cameras.yaml --------------------------------------------------------------------------------
-
-def camera_set_of(root: Mapping[str, Any], name: str) -> dict[str, Camera]:
-    """The cameras of a parsed cameras.yaml, in the order of the file."""
-    cameras = {}
-    for entry, values in root.items():
-        where = f"{name}: {entry}"
-        if not isinstance(values, dict):
-            raise FormatError(f"{where} is not a map of names and values")
-        width, height = (_side(_number_at(values, side, where), side, where)
-                         for side in ("image_width", "image_height"))
-        fx, fy, cx, cy = (_number_at(values, key, where) for key in ("fx", "fy", "cx", "cy"))
-        _check_focal(fx, "fx", where)
-        _check_focal(fy, "fy", where)
-        k = [_number_at(values, key, where) if key in values else 0.0 for key in _COEFFICIENTS]
-        cameras[entry] = _camera(width, height, (fx, fy, cx, cy), CameraModel.BROWN_CONRADY, k)
-    if not cameras:
-        raise FormatError(f"{name}: no camera in it")
-    return cameras
-
-
-def _is_camera_set(root: Mapping[str, Any]) -> bool:
-    return any(isinstance(item, dict) and {"fx", "fy", "image_width"} & set(item)
-               for item in root.values())
+        raise FormatError(f"{name}: XML of {root.tag[:40]}, not OpenCV's opencv_storage (Metashape "
+                          "saves this as OpenCV Calibration)")
+    values = _xml_value(root, name)
+    return values if isinstance(values, dict) else {}
 
 
 # ---- COLMAP --------------------------------------------------------------------------------------
+
+_PINHOLE, _BROWN, _FISHEYE = (CameraModel.PINHOLE, CameraModel.BROWN_CONRADY,
+                              CameraModel.KANNALA_BRANDT)
+_ONE, _TWO = (0, 0, 1, 2), (0, 1, 2, 3)  # places of fx fy cx cy among the parameters
+#: COLMAP's models: the lens, the places of fx fy cx cy, and for each parameter behind them its
+#: place in Camera.k, or its name where no model here has it, so that it must be 0.
+COLMAP_MODELS: dict[str, tuple[CameraModel, tuple[int, ...], tuple[Union[int, str], ...]]] = {
+    "SIMPLE_PINHOLE": (_PINHOLE, _ONE, ()),
+    "PINHOLE": (_PINHOLE, _TWO, ()),
+    "SIMPLE_RADIAL": (_BROWN, _ONE, (0,)),
+    "RADIAL": (_BROWN, _ONE, (0, 1)),
+    "OPENCV": (_BROWN, _TWO, (0, 1, 2, 3)),
+    "FULL_OPENCV": (_BROWN, _TWO, (0, 1, 2, 3, 4, 5, 6, 7)),
+    "SIMPLE_FISHEYE": (_FISHEYE, _ONE, ()),
+    "FISHEYE": (_FISHEYE, _TWO, ()),
+    "SIMPLE_RADIAL_FISHEYE": (_FISHEYE, _ONE, (0,)),
+    "RADIAL_FISHEYE": (_FISHEYE, _ONE, (0, 1)),
+    "OPENCV_FISHEYE": (_FISHEYE, _TWO, (0, 1, 2, 3)),
+    "THIN_PRISM_FISHEYE": (_FISHEYE, _TWO, (0, 1, "p1", "p2", 2, 3, "sx1", "sy1")),
+    "RAD_TAN_THIN_PRISM_FISHEYE": (_FISHEYE, _TWO, (0, 1, 2, 3, "k4", "k5", "p0", "p1", "s0", "s1",
+                                                    "s2", "s3")),
+    "SIMPLE_DIVISION": (_PINHOLE, _ONE, ("k",)),
+    "DIVISION": (_PINHOLE, _TWO, ("k",)),
+}
+
+
+def colmap_camera(model: str, width: int, height: int, params: Sequence[float],
+                  where: str) -> Camera:
+    """The camera of one of COLMAP's models. FormatError, which begins with `where`, names a model
+    or a parameter that no lens here has."""
+    if model not in COLMAP_MODELS:
+        raise FormatError(f"{where}: COLMAP's model {model[:40]} is not one of "
+                          + ", ".join(COLMAP_MODELS))
+    lens, places, tail = COLMAP_MODELS[model]
+    first = places[3] + 1
+    if len(params) != first + len(tail):
+        raise FormatError(f"{where}: {model} has {first + len(tail)} parameters, not {len(params)}")
+    k = [0.0] * NUM_MODELLED
+    for place, value in zip(tail, params[first:]):
+        if isinstance(place, int):
+            k[place] = float(value)
+        elif value:
+            raise FormatError(f"{where}: {model}'s {place} is not 0, and no lens here has it")
+    fx, fy, cx, cy = (float(params[place]) for place in places)
+    return checked_camera(int(width), int(height), (fx, fy, cx - HALF_PIXEL, cy - HALF_PIXEL), lens,
+                          k, where)
+
 
 def _colmap_lines(text: str) -> list[tuple[int, list[str]]]:
     """The fields of each line that is neither blank nor a comment, with its number."""
@@ -361,7 +202,7 @@ def _colmap_lines(text: str) -> list[tuple[int, list[str]]]:
 
 def _is_colmap(text: str) -> bool:
     """Whether the first line with content begins as COLMAP's: a number and a model's name."""
-    for _, fields in _colmap_lines(text[1:] if text.startswith("\ufeff") else text)[:1]:
+    for _, fields in _colmap_lines(text)[:1]:
         return (len(fields) >= 3 and re.fullmatch("[0-9]+", fields[0]) is not None
                 and re.fullmatch("[A-Z][A-Z0-9_]*", fields[1]) is not None)
     return False
@@ -369,44 +210,247 @@ def _is_colmap(text: str) -> bool:
 
 def _colmap_cameras(text: str, name: str) -> dict[str, Camera]:
     cameras = {}
-    for number, fields in _colmap_lines(text[1:] if text.startswith("\ufeff") else text):
+    for number, fields in _colmap_lines(text):
         where = f"{name}: line {number}"
         if len(fields) < 3:
             raise FormatError(f"{where} is not CAMERA_ID MODEL WIDTH HEIGHT PARAMETERS")
-        if fields[1] not in _COLMAP:
-            raise FormatError(f"{where}: COLMAP's model {fields[1][:40]} is not one of "
-                              + ", ".join(_COLMAP))
-        lens, places, num_lens = _COLMAP[fields[1]]
-        count = places[3] + 1 + num_lens
-        if len(fields) != 4 + count:
-            raise FormatError(f"{where}: {fields[1]} has {count} parameters, not "
-                              f"{max(len(fields) - 4, 0)}")
         values = []
         for field in fields[2:]:
             try:
                 values.append(parse_number(field))
             except FormatError:
                 raise FormatError(f"{where}: '{field[:40]}' is no finite number") from None
-        fx, fy, cx, cy = (values[2 + place] for place in places)
-        _check_focal(fx, "fx", where)
-        _check_focal(fy, "fy", where)
         if fields[0] in cameras:
             raise FormatError(f"{where}: camera {fields[0]} is given twice")
-        cameras[fields[0]] = _camera(
-            _side(values[0], "WIDTH", where), _side(values[1], "HEIGHT", where),
-            (fx, fy, cx - _COLMAP_HALF_PIXEL, cy - _COLMAP_HALF_PIXEL), lens,
-            values[2 + places[3] + 1:])
+        if len(values) < 2:
+            raise FormatError(f"{where} is not CAMERA_ID MODEL WIDTH HEIGHT PARAMETERS")
+        cameras[fields[0]] = colmap_camera(
+            fields[1], side_of(values[0], "WIDTH", where), side_of(values[1], "HEIGHT", where),
+            values[2:], where)
     return cameras
 
 
-# ---- any format ----------------------------------------------------------------------------------
+# ---- formats of entries --------------------------------------------------------------------------
+
+class _Read:
+    """What a file holds, as it is read."""
+
+    def __init__(self) -> None:
+        self.cameras: dict[str, Camera] = {}
+        self.sigmas = PLAIN_FILE
+        self.left_out: list[str] = []
+
+    def add(self, name: str, values: Mapping[str, Any], where: str) -> None:
+        self.cameras[name] = take_camera(Entries(values, where), self.left_out)
+
+    def judge(self, root: Mapping[str, Any], where: str) -> None:
+        """Judges the entries beside the cameras; how sure the calibration is may be among them."""
+        rest = Entries(root, where)
+        self.sigmas = PLAIN_FILE._replace(**sigmas_of(rest))
+        refused, left_out = rest.judged()
+        refuse(refused, where)
+        self.left_out += left_out
+
+
+def camera_set_of(root: Mapping[str, Any], name: str,
+                  left_out: Optional[list[str]] = None) -> dict[str, Camera]:
+    """The cameras of a parsed cameras.yaml, in the order of the file."""
+    cameras, more = {}, [] if left_out is None else left_out
+    for entry, values in root.items():
+        where = f"{name}: {entry}"
+        if not isinstance(values, dict):
+            raise FormatError(f"{where} is not a map of names and values")
+        cameras[entry] = take_camera(Entries(values, where), more)
+    if not cameras:
+        raise FormatError(f"{name}: no camera in it")
+    return cameras
+
+
+_ORB_SLAM = re.compile(r"(Camera[0-9]*)\.(.+)")
+# Of ORB-SLAM's, stella_vslam's and VINS's settings: the parts that are not of the camera.
+_OTHER_SETTINGS = re.compile(
+    r"(IMU|Viewer|ORBextractor|System|Stereo|RGBD|Tracking|Mapping|Feature|Initializer|PangolinViewer"
+    r"|SocketPublisher|Preprocessing|KeyframeInserter|Relocalizer|LoopDetector|LoopBundleAdjuster"
+    r"|GraphOptimizer|MarkerModel|loopClosing)(\..*)?")
+
+
+def _orb_slam(root: Mapping[str, Any], name: str, read: _Read) -> bool:
+    """ORB-SLAM's settings: Camera.fx, or Camera1.fx and Camera2.fx beside Camera.width."""
+    parts: dict[str, dict[str, Any]] = {}
+    rest = {}
+    for entry, value in root.items():
+        found = _ORB_SLAM.fullmatch(entry)
+        if found:
+            parts.setdefault(found[1], {})[found[2]] = value
+        elif not _OTHER_SETTINGS.fullmatch(entry):
+            rest[entry] = value
+    shared = parts.pop("Camera", {})
+    lenses = {part: values for part, values in parts.items() if is_camera(values)}
+    for part in parts.keys() - lenses.keys():
+        rest[part] = parts[part]
+    common = {entry: value for entry, value in shared.items()
+              if entry not in ("fx", "fy", "cx", "cy", *COEFFICIENTS)}
+    if is_camera(shared):
+        lenses = {"Camera": {}, **lenses}
+    for part, values in lenses.items():
+        mine = shared if part == "Camera" else {**common, **values}
+        read.add("" if len(lenses) == 1 else part, mine, f"{name}: {part}")
+    if lenses:
+        read.judge(rest, name)
+    return bool(lenses)
+
+
+def _vins(root: Mapping[str, Any], name: str, read: _Read) -> bool:
+    """VINS's camera files (camodocal): the model's name, and maps of its parameters."""
+    if "model_type" not in root or not {"projection_parameters", "mirror_parameters"} & set(root):
+        return False
+    word = word_of(root["model_type"], "model_type", name)
+    values = {entry: value for entry, value in root.items()
+              if entry != "fisheye" and not _OTHER_SETTINGS.fullmatch(entry)}
+    if word == "KANNALA_BRANDT":  # its k2 to k5 are of theta^3 to theta^9; mu, mv are fx, fy
+        names = {"k2": "k1", "k3": "k2", "k4": "k3", "k5": "k4", "mu": "fx", "mv": "fy", "u0": "cx",
+                 "v0": "cy"}
+        inner = values.get("projection_parameters")
+        if isinstance(inner, dict):
+            values["projection_parameters"] = {names.get(key, f"?{key}"): item
+                                               for key, item in inner.items()}
+    elif word != "PINHOLE":
+        raise FormatError(f"{name}: VINS's model_type '{word[:40]}' is not one of PINHOLE, "
+                          "KANNALA_BRANDT: no lens here is that")
+    read.add("", values, name)
+    return True
+
+
+def _nerfstudio(root: Mapping[str, Any], name: str, read: _Read) -> bool:
+    """nerfstudio's and instant-ngp's transforms.json: COLMAP's numbers with names of their own."""
+    frames = root.get("frames")
+    own = next((key for frame in frames for key in frame if isinstance(frame, dict)
+                and key in ("fl_x", "fl_y", "cx", "cy", "k1", "k2", "p1", "p2", "w", "h")),
+               None) if isinstance(frames, list) else None
+    if own:
+        raise FormatError(f"{name}: a frame has {own} of its own (one camera for each picture); "
+                          + _WRITE_OURS)
+    if "fl_x" not in root:
+        return False
+    if "fl_y" not in root:
+        root = {**root, "fl_y": root["fl_x"]}
+    if root.get("camera_model") not in ("OPENCV_FISHEYE", "FISHEYE"):
+        k4 = root.get("k4")
+        if k4 is not None and number_of(k4, "k4", name) != 0:
+            raise FormatError(f"{name}: k4 is not 0, and no lens here has nerfstudio's k4")
+    read.add("", {key: value for key, value in root.items() if key != "scale"}, name)
+    camera = read.cameras[""]
+    read.cameras[""] = Camera(camera.width, camera.height, camera.fx, camera.fy,
+                              camera.cx - HALF_PIXEL, camera.cy - HALF_PIXEL, camera.model,
+                              camera.k)
+    return True
+
+
+_STEREO = re.compile("(m|k|cameramatrix|matrix|mtx|intrinsics?)(1|2|l|r|left|right)|"
+                     "(left|right)(k|cameramatrix|matrix|mtx|intrinsics?)|"
+                     "(1|2|l|r)(cameramatrix|mtx)")
+
+
+def _refuse_by_name(root: Mapping[str, Any], name: str) -> None:
+    """Refuses the files of other programs whose cameras are not read, with what to do."""
+    pair = [entry for entry, value in root.items()
+            if _STEREO.fullmatch(plain(entry)) and isinstance(value, (dict, list))]
+    if pair:
+        raise FormatError(f"{name}: a file of several cameras ({', '.join(pair[:4])}), which are "
+                          "read one a file: for each, " + _WRITE_OURS)
+    items = [item for item in root.values() if isinstance(item, dict)]
+    intrinsics = root.get("intrinsics")
+    other = (
+        "Basalt's calibration" if "value0" in root else
+        "Gyroflow's lens profile" if "fisheye_params" in root else
+        "OpenSfM's camera_models.json, whose focal length is relative to the picture's size"
+        if any("projection_type" in item for item in items) else
+        "OpenMVG's or AliceVision's scene" if "sfm_data_version" in root or (
+            isinstance(intrinsics, list) and any(isinstance(i, dict) for i in intrinsics)) else
+        "KITTI's calibration" if {"P0", "K_00", "P_rect_00"} & set(root) else "")
+    if other:
+        raise FormatError(f"{name}: {other}; {_WRITE_OURS}")
+
+
+def _refuse_text_by_name(text: str, name: str) -> None:
+    """Refuses the text files of other programs, with what to do."""
+    lines = [line.split() for line in text.split("\n") if line.strip()]
+    if text.startswith("# oST") or lines[:1] == [["[image]"]]:
+        raise FormatError(f"{name}: ROS's INI (oST); convert it: rosrun camera_calibration_parsers "
+                          "convert camera.ini camera.yaml")
+    if text.startswith("Pix4D"):
+        raise FormatError(f"{name}: Pix4D's camera; {_WRITE_OURS}")
+    first = lines[0] if lines else []
+    is_dso = bool(first) and first[0] in ("Pinhole", "RadTan", "FOV", "EquiDistant", "ATAN",
+                                          "KannalaBrandt")
+    numbers = [word for word in first if re.fullmatch(r"[-+0-9.eE]+", word)]
+    if is_dso and len(first) > 1 or len(first) >= 4 and len(numbers) == len(first):
+        raise FormatError(f"{name}: a camera of DSO, LSD-SLAM or PTAM (tum_ardrone), whose numbers "
+                          "may be relative to the picture's size; " + _WRITE_OURS)
+
+
+def _svo(root: Mapping[str, Any], name: str, read: _Read) -> bool:
+    """SVO's and maplab's calibration: a list `cameras` of maps `camera`."""
+    cameras = root.get("cameras")
+    if not isinstance(cameras, list):
+        return False
+    for i, item in enumerate(cameras):
+        inner = item.get("camera", item) if isinstance(item, dict) else None
+        where = f"{name}: cameras[{i}]"
+        if not isinstance(inner, dict) or not is_camera(inner):
+            raise FormatError(f"{where} is no camera with intrinsics")
+        label = inner.get("label")
+        camera_name = label if isinstance(label, str) else f"cam{i}"
+        if camera_name in read.cameras:
+            raise FormatError(f"{where}: {camera_name} is given twice")
+        read.add(camera_name, inner, where)
+    read.judge({key: item for key, item in root.items() if key != "cameras"}, name)
+    return bool(cameras)
+
+
+def _named(root: Mapping[str, Any], name: str, read: _Read) -> bool:
+    """Kalibr's camchain, a data set's cameras.yaml, stella_vslam's settings: maps by name."""
+    rest = {}
+    for entry, values in root.items():
+        if is_camera(values):
+            read.add(entry, values, f"{name}: {entry}")
+        elif not _OTHER_SETTINGS.fullmatch(entry):
+            rest[entry] = values
+    if read.cameras:
+        read.judge(rest, name)
+    return bool(read.cameras)
+
 
 def _root_of(text: str, name: str) -> dict[str, Any]:
-    is_xml = text.lstrip("\ufeff \t\r\n").startswith("<")
+    is_xml = text.lstrip(" \t\r\n").startswith("<")
     try:
         return (_parse_xml if is_xml else parse_yaml)(text, name)
     except FormatError as error:
         raise FormatError(f"{error}{KNOWN}") from None
+
+
+def _read_file(text: str, name: str) -> _Read:
+    read = _Read()
+    text = text[1:] if text.startswith("\ufeff") else text
+    if _is_colmap(text):
+        read.cameras = _colmap_cameras(text, name)
+        return read
+    _refuse_text_by_name(text, name)
+    root = _root_of(text, name)
+    if is_camera(root) and "fl_x" not in root and "model_type" not in root:
+        _refuse_by_name(root, name)
+        entries = Entries(root, name)
+        read.sigmas = PLAIN_FILE._replace(**sigmas_of(entries))
+        entry = root.get("camera_name")
+        read.cameras[entry if isinstance(entry, str) else ""] = take_camera(entries, read.left_out)
+        return read
+    if any(known(root, name, read) for known in (_orb_slam, _vins, _nerfstudio, _svo)):
+        return read
+    _refuse_by_name(root, name)
+    if _named(root, name, read):
+        return read
+    refused = Entries(root, name).missing("camera_matrix")
+    raise FormatError(f"{refused}{KNOWN}")
 
 
 def parse_cameras(text: str, name: str) -> dict[str, Camera]:
@@ -414,23 +458,15 @@ def parse_cameras(text: str, name: str) -> dict[str, Camera]:
     cameras.yaml, COLMAP's numbers, ROS's camera_name; "" for a camera without a name.
 
     text: what the file holds. name: of the file, for messages.
-    Returns {name: Camera}, which the library has not checked.
+    Returns {name: Camera}, which the library has not checked. Gives a CameraFileWarning that lists
+    the entries that were left out, since they cannot concern the lens.
     Raises FormatError that names the file, the entry and, where no format is recognised, the
     formats that are known; ImportError without PyYAML."""
-    if _is_colmap(text):
-        return _colmap_cameras(text, name)
-    root = _root_of(text, name)
-    if any(entry in root for entry in _MATRIX):
-        entry = root.get("camera_name")
-        return {entry if isinstance(entry, str) else "": camera_of(root, name)}
-    cameras = {"": _kalibr_camera(root, name)} if _is_kalibr(root) else {}
-    cameras.update({entry: _kalibr_camera(node, f"{name}: {entry}")
-                    for entry, node in root.items() if _is_kalibr(node)})
-    if cameras:
-        return cameras
-    if _is_camera_set(root):
-        return camera_set_of(root, name)
-    raise FormatError(f"{name}: camera_matrix is missing{KNOWN}")
+    read = _read_file(text, name)
+    if read.left_out:
+        shown = ", ".join(read.left_out[:8]) + (", ..." if len(read.left_out) > 8 else "")
+        warnings.warn(f"{name}: left out: {shown}", CameraFileWarning, stacklevel=3)
+    return read.cameras
 
 
 def read_cameras(path: PathLike) -> dict[str, Camera]:
@@ -464,13 +500,17 @@ def only_camera(cameras: Mapping[str, Camera], name: Optional[str], path: str) -
     raise FormatError(f"{path} has no camera '{name}' but {names or 'one without a name'}")
 
 
-def read_camera(path: PathLike, name: Optional[str] = None) -> Camera:
+def read_camera(path: PathLike, name: Optional[str] = None,
+                scale_to: Optional[tuple[int, int]] = None) -> Camera:
     """The camera of a file, or the one of that name in a file with several.
 
     path: of the file, in any format of read_cameras. name: None where the file has one camera.
+    scale_to: None, or (width, height) of the picture, whose camera Camera.scaled makes.
     Returns a Camera.
-    Raises as read_cameras does, and FormatError that lists the names where none or several fit."""
-    return only_camera(read_cameras(path), name, os.fspath(path))
+    Raises as read_cameras does, FormatError that lists the names where none or several fit, and
+    ValueError where scale_to has another shape."""
+    camera = only_camera(read_cameras(path), name, os.fspath(path))
+    return camera if scale_to is None else camera.scaled(*scale_to)
 
 
 def read_sigmas(path: PathLike) -> CalibrationSigmas:
@@ -479,17 +519,9 @@ def read_sigmas(path: PathLike) -> CalibrationSigmas:
 
     path: of the file, in any format of read_cameras.
     Returns CalibrationSigmas; those of PLAIN_FILE, 0.01 and 0.005, where the file does not say.
-    Raises FormatError where one is not in [0, 0.5]; OSError; ImportError without PyYAML."""
-    text, name = read_text(path), os.fspath(path)
-    if _is_colmap(text):
-        return PLAIN_FILE
-    root, found = _root_of(text, name), PLAIN_FILE._asdict()
-    for part in found:
-        if root.get(part + "_sigma") is not None:
-            found[part] = _number_at(root, part + "_sigma", name)
-            if not 0 <= found[part] <= 0.5:
-                raise FormatError(f"{name}: {part}_sigma is not in [0, 0.5]")
-    return CalibrationSigmas(**found)
+    Raises FormatError for a file that read_cameras refuses, and where one is not in [0, 0.5];
+    OSError; ImportError without PyYAML."""
+    return _read_file(read_text(path), os.fspath(path)).sigmas
 
 
 # ---- writing -------------------------------------------------------------------------------------
@@ -597,7 +629,7 @@ def _camera_set(name: str, camera: Camera, sigmas: Optional[CalibrationSigmas]) 
     k = _padded(camera)
     if _is_fisheye(camera) or any(k[5:]):
         raise ValueError(f"{name}: a cameras.yaml has k1 k2 p1 p2 k3 and no other lens")
-    entries = zip(("fx", "fy", "cx", "cy", *_COEFFICIENTS),
+    entries = zip(("fx", "fy", "cx", "cy", *COEFFICIENTS[:5]),
                   (camera.fx, camera.fy, camera.cx, camera.cy, *k[:5]))
     return (f"{_quoted(name)}:\n  image_width: {camera.width}\n  image_height: {camera.height}\n"
             + "".join(f"  {entry}: {_digits(value)}\n" for entry, value in entries))
@@ -608,8 +640,8 @@ def _colmap(name: str, camera: Camera, sigmas: Optional[CalibrationSigmas]) -> s
     model, k = (("PINHOLE", []) if camera.model == CameraModel.PINHOLE else
                 ("OPENCV_FISHEYE", k[:4]) if _is_fisheye(camera) else
                 ("OPENCV", k[:4]) if not any(k[4:]) else ("FULL_OPENCV", k))
-    values = [camera.fx, camera.fy, camera.cx + _COLMAP_HALF_PIXEL,
-              camera.cy + _COLMAP_HALF_PIXEL, *k]
+    values = [camera.fx, camera.fy, camera.cx + HALF_PIXEL,
+              camera.cy + HALF_PIXEL, *k]
     return f"{name} {model} {camera.width} {camera.height} {' '.join(map(_digits, values))}\n"
 
 
@@ -632,8 +664,8 @@ def format_cameras(cameras: Union[Camera, Mapping[str, Camera]], format: str = "
     "kalibr" (camchain), "cameras.yaml" or "colmap" (cameras.txt). sigmas: None, or how sure the
     calibration is, which "opencv", "opencv-xml" and "ros" have entries for.
     Returns the text.
-    Raises ValueError for another format, for a lens or sigmas that the format does not have, and
-    for several cameras in a format of one; TV_ERR_CAMERA for a camera that the library refuses."""
+    Raises ValueError for another format, for a lens or sigmas that the format does not have, for
+    several cameras in a format of one, and for numbers that read_cameras refuses; TV_ERR_CAMERA for a camera that the library refuses."""
     if format not in _WRITERS:
         raise ValueError(f"format '{format}' is not one of {', '.join(FORMATS)}")
     write, has_names, has_sigmas = _WRITERS[format]
@@ -643,8 +675,10 @@ def format_cameras(cameras: Union[Camera, Mapping[str, Camera]], format: str = "
     if not named or (len(named) > 1 and not has_names):
         raise ValueError(f"{len(named)} cameras: a file of the format {format} holds "
                          + ("at least one" if has_names else "one"))
-    for camera in named.values():
+    for name, camera in named.items():
         camera_check(camera)
+        checked_camera(camera.width, camera.height, (camera.fx, camera.fy, camera.cx, camera.cy),
+                       CameraModel(camera.model), camera.k, name)
     if format == "colmap" and not all(re.fullmatch("[0-9]+", name) for name in named):
         named = {str(number): camera for number, camera in enumerate(named.values(), 1)}
     head = "# CAMERA_ID MODEL WIDTH HEIGHT PARAMETERS\n" if format == "colmap" else ""

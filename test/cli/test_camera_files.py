@@ -154,11 +154,76 @@ class CameraFiles(cli.CliTest):
                                         self.write("bad", text), "-o", self.out)
                 self.assert_refused(done, "bad", *words)
 
-    def test_xml_is_said_to_be_read_by_python_only(self):
-        path = self.write("camera.xml", '<?xml version="1.0"?>\n<opencv_storage>\n'
-                          "<image_width>320</image_width>\n</opencv_storage>\n")
-        done = self.run_program("undistort", self.a, "--camera", path, "-o", self.out)
-        self.assert_refused(done, "camera.xml is XML, which only the Python package reads", "YAML")
+    def test_opencvs_xml_and_json_are_read(self):
+        matrix = [FX, 0, CX, 0, FY, CY, 0, 0, 1]
+        entries = "".join(
+            f'<{name} type_id="opencv-matrix"><rows>{rows}</rows><cols>{len(values) // rows}'
+            f"</cols><dt>d</dt><data>{' '.join(map(str, values))}</data></{name}>"
+            for name, rows, values in (("camera_matrix", 3, matrix),
+                                       ("distortion_coefficients", 4, RADTAN)))
+        self.assert_same('<?xml version="1.0"?>\n<opencv_storage>\n'
+                         f"<image_width>{WIDTH}</image_width><image_height>{HEIGHT}</image_height>"
+                         f"{entries}\n</opencv_storage>\n", RADTAN)
+        self.assert_same(json.dumps({
+            "image_width": WIDTH, "image_height": HEIGHT,
+            "camera_matrix": {"type_id": "opencv-matrix", "rows": 3, "cols": 3, "dt": "d",
+                              "data": matrix},
+            "distortion_coefficients": {"type_id": "opencv-matrix", "rows": 1, "cols": 4, "dt": "d",
+                                        "data": RADTAN}}, indent=4), RADTAN)
+
+    def test_a_lens_of_another_spelling_is_not_dropped(self):
+        for name in ("dist_coeffs", "distCoeffs", "dist_coefs", "distortion"):
+            with self.subTest(name=name):
+                self.assert_same(opencv(RADTAN).replace("distortion_coefficients", name), RADTAN)
+
+    def test_opencvs_calibration_sample_says_that_a_lens_is_a_fisheye(self):
+        self.assert_same(opencv(FISHEYE) + "fisheye_model: 1\nflags: 10\n", FISHEYE,
+                         "distortion_model: equidistant\n")
+
+    def test_entries_that_are_not_understood(self):
+        for entry in ("lens_shading: 1", "xi: 0.9", "crop: [1, 2]"):
+            with self.subTest(entry=entry):
+                camera = self.write("c.yaml", opencv(RADTAN) + entry + "\n")
+                done = self.run_program("undistort", self.a, "--camera", camera, "-o", self.out)
+                self.assert_refused(done, "c.yaml", entry.split(":")[0], "may concern the lens")
+        camera = self.write("c.yaml", camera_yaml() + "weather: fine\nboard_width: 9\n")
+        for verb in ("undistort", "reconstruct"):
+            with self.subTest(verb=verb):
+                images = [self.a] if verb == "undistort" else [self.a, self.b]
+                done = self.run_program(verb, *images, "--camera", camera, "-o", self.folder / verb)
+                self.succeed(done)
+                self.assertIn(b"left out: weather", done.stdout)
+                self.assertNotIn(b"board_width", done.stdout)
+
+    def test_a_camera_of_another_size_is_scaled_where_the_user_says_so(self):
+        large = self.write("large.yaml", camera_yaml(
+            width=2 * WIDTH, height=2 * HEIGHT, fx=2 * cli.FOCAL, fy=2 * cli.FOCAL,
+            cx=WIDTH - 0.5, cy=HEIGHT - 0.5))
+        wide = self.write("wide.yaml", camera_yaml(width=2 * WIDTH, height=HEIGHT))
+        pairs = self.write("pairs.txt", "a.png b.png\n")
+        (self.folder / "frames").mkdir()
+        for i in range(3):
+            (self.folder / "frames" / f"{i}.png").write_bytes(self.a.read_bytes())
+        frames = self.folder / "frames"
+        for verb, *arguments in (
+                ("reconstruct", self.a, self.b), ("undistort", self.a),
+                ("evaluate", pairs, "--images", self.folder), ("odometry", frames, "--fps", "10")):
+            with self.subTest(verb=verb):
+                run = lambda *more: self.run_program(verb, *arguments, *more, "-o", self.out)
+                self.assert_refused(run("--camera", large), f"{WIDTH}x{HEIGHT}",
+                                    f"{2 * WIDTH}x{2 * HEIGHT}", "--scale-camera")
+                self.assert_refused(run("--camera", wide, "--scale-camera"), "does not help")
+                done = run("--camera", large, "--scale-camera")
+                self.assertNotEqual(done.returncode, 2, done.stderr)
+                if verb == "reconstruct":
+                    found = self.result()
+                    self.succeed(self.reconstruct())
+                    for key in ("R", "t", "num_inliers"):
+                        self.assertEqual(found[key], self.result()[key])
+                    self.assertIn(b"is scaled from", done.stdout)
+                if verb == "undistort":
+                    camera = (self.out / "camera.yaml").read_text()
+                    self.assertIn(f"data: [ {cli.FOCAL}, 0, {(WIDTH - 1) / 2}, ", camera)
 
     def test_every_verb_takes_them(self):
         chain = self.write("chain.yaml", kalibr("a b", "none", ()))

@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "base/error.h"
-#include "files/camera_file.h"
 #include "files/camera_formats.h"
 #include "files/camera_set.h"
 #include "files/pairs_file.h"

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "base/error.h"
-#include "files/camera_file.h"
+#include "files/camera_formats.h"
 #include "files/camera_set.h"
 #include "files/image_header.h"
 #include "files/matches_file.h"
@@ -521,7 +521,7 @@ void test_a_written_camera_reads_back_to_the_same_bits() {
   cameras[3].model = TV_CAMERA_PINHOLE;
   std::memset(cameras[3].k, 0, sizeof cameras[3].k);
   for (tv_camera& camera : cameras) {
-    camera.fx = 0.1 + 0.2;
+    camera.fx = 100 * (0.1 + 0.2);
     camera.k[1] = camera.model == TV_CAMERA_PINHOLE ? 0 : -1.0 / 3;
     const tv_camera again = parse_camera(camera_yaml(camera), "c");
     TEST_ASSERT_EQUAL_MEMORY(&camera, &again, sizeof camera);

@@ -64,7 +64,7 @@ def test_colmaps_simpler_cameras_are_read(model, params):
 
 
 def test_other_lenses_are_named():
-    with pytest.raises(ValueError, match="a.jpg: COLMAP's FOV"):
+    with pytest.raises(ValueError, match="a.jpg: COLMAP's model FOV"):
         conventions.camera_from_colmap(
             conventions.ColmapCamera("FOV", 9, 9, (1, 1, 1, 1, 1)), "a.jpg"
         )

@@ -16,8 +16,8 @@ with positive focal lengths. T is [R t; 0 0 0 1]; each element of R R^T must be 
 identity's, and det R must be positive. A file without a pair is refused. The message for a refused
 line has the line's number.
 
-Camera file. docs/formats.md states the formats and their entries. Names that are not known are
-ignored. A lens of Brown and Conrady whose coefficients are all 0 is a pinhole. If a matrix gives
+Camera file. docs/formats.md states the formats and their entries. A name that is not known and may
+concern the lens is refused; others are left out. A lens of Brown and Conrady whose coefficients are all 0 is a pinhole. If a matrix gives
 rows and cols, their product must equal its number of values. A file without a camera is refused.
 
 YAML. The first document of a file is read, as a map. A name given twice and an alias are refused.
@@ -166,7 +166,7 @@ def _plain(camera):
 
 def parse_camera(text, name):
     """Parses the text of a camera file; `name` is used in messages."""
-    return _plain(camera_files.camera_of(camera_files.parse_yaml(text, name), name))
+    return _plain(camera_files.only_camera(camera_files.parse_cameras(text, name), None, name))
 
 
 def parse_cameras(text, name):
@@ -178,8 +178,7 @@ def parse_cameras(text, name):
 def read_camera(path):
     """Reads the one camera of a file of any format. FormatError names the file; OSError is not
     caught."""
-    return _plain(camera_files.only_camera(
-        camera_files.parse_cameras(camera_files.read_text(path), path), None, path))
+    return parse_camera(camera_files.read_text(path), path)
 
 
 def parse_camera_set(text, name):

@@ -6,7 +6,7 @@
 
 #include "base/error.h"
 #include "base/output.h"
-#include "files/camera_file.h"
+#include "files/camera_entries.h"
 #include "files/yaml_values.h"
 
 namespace cli {
@@ -22,39 +22,33 @@ bool is_same(const tv_camera& a, const tv_camera& b) {
 
 }  // namespace
 
-NamedCameras camera_set_from_yaml(const YAML::Node& root, const std::string& name) {
+NamedCameras parse_camera_set(const std::string& text, const std::string& name,
+                              std::vector<std::string>* left_out) {
+  const YAML::Node root = parse_yaml(text, name);
+  std::vector<std::string> ignored;
   NamedCameras cameras;
   for (const auto& item : root) {
     const std::string key = item.first.IsScalar() ? item.first.Scalar() : "?";
     const std::string where = name + ": " + key;
     if (!item.second.IsMap()) throw BadInput(where + " is not a map of names and values");
-    tv_camera camera{};
-    camera.width = side_at(item.second, "image_width", where);
-    camera.height = side_at(item.second, "image_height", where);
-    camera.fx = number_at(item.second, "fx", where);
-    camera.fy = number_at(item.second, "fy", where);
-    camera.cx = number_at(item.second, "cx", where);
-    camera.cy = number_at(item.second, "cy", where);
-    require_focal(camera.fx, "fx", where);
-    require_focal(camera.fy, "fy", where);
-    const char* const entries[] = {"k1", "k2", "p1", "p2", "k3"};
-    for (int i = 0; i < 5; ++i) {
-      if (item.second[entries[i]]) camera.k[i] = number_at(item.second, entries[i], where);
-      if (camera.k[i] != 0) camera.model = TV_CAMERA_BROWN_CONRADY;
-    }
-    check(tv_camera_check(&camera), where);
-    cameras.emplace_back(key, camera);
+    CameraEntries entries(item.second, where);
+    cameras.emplace_back(key, take_camera(entries, left_out ? *left_out : ignored));
   }
   if (cameras.empty()) throw BadInput(name + ": no camera in it");
   return cameras;
 }
 
-NamedCameras parse_camera_set(const std::string& text, const std::string& name) {
-  return camera_set_from_yaml(parse_yaml(text, name), name);
+NamedCameras load_camera_set(const std::string& path, std::vector<std::string>* left_out) {
+  return parse_camera_set(read_file(path, kMaxFileBytes), path, left_out);
 }
 
-NamedCameras load_camera_set(const std::string& path) {
-  return parse_camera_set(read_file(path, kMaxFileBytes), path);
+std::string left_out_note(const std::string& path, const std::vector<std::string>& left_out) {
+  constexpr size_t most = 8;
+  std::string names;
+  for (size_t i = 0; i < std::min(most, left_out.size()); ++i)
+    names += (i ? ", " : "") + left_out[i];
+  if (names.empty()) return "";
+  return "camera " + path + ": left out: " + names + (left_out.size() > most ? ", ..." : "");
 }
 
 const tv_camera* choose_camera(const NamedCameras& cameras, const std::string& image_name,

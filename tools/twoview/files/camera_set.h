@@ -1,8 +1,6 @@
 // cameras.yaml of a data set: its cameras by name, and the choice of the camera of an image.
 #pragma once
 
-#include <yaml-cpp/yaml.h>
-
 #include <array>
 #include <string>
 #include <utility>
@@ -14,9 +12,12 @@ namespace cli {
 
 // The cameras of a set with their names, in the order of the file.
 using NamedCameras = std::vector<std::pair<std::string, tv_camera>>;
-NamedCameras load_camera_set(const std::string& path);
-NamedCameras parse_camera_set(const std::string& text, const std::string& name);
-NamedCameras camera_set_from_yaml(const YAML::Node& root, const std::string& name);
+// Adds to left_out the names of entries that are not needed and cannot concern the lens.
+NamedCameras load_camera_set(const std::string& path, std::vector<std::string>* left_out = nullptr);
+NamedCameras parse_camera_set(const std::string& text, const std::string& name,
+                              std::vector<std::string>* left_out = nullptr);
+// A line that names the entries of a camera file that were left out; empty where there are none.
+std::string left_out_note(const std::string& path, const std::vector<std::string>& left_out);
 
 // The entry of a set that serves an image. One entry serves every image. With several, it is the
 // entry whose name begins the file's name (the longest such name; folders do not count), else the

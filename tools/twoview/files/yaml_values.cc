@@ -2,6 +2,7 @@
 
 #include <yaml-cpp/eventhandler.h>
 
+#include <algorithm>
 #include <cctype>
 #include <charconv>
 #include <cmath>
@@ -13,25 +14,9 @@
 namespace cli {
 namespace {
 
-// Parses a number. The syntax is strict except for a leading plus and a trailing point ("0."),
-// which OpenCV writes. The words of YAML and OpenCV for NaN and infinity are accepted as such.
-bool read_number(std::string text, double& value) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  if (!text.empty() && text[0] == '+') {
-    text.erase(0, 1);
-    if (!text.empty() && text[0] == '-') return false;
-  }
-  const std::string bare = !text.empty() && text[0] == '-' ? text.substr(1) : text;
-  if (bare == ".nan" || bare == "nan") return value = NAN, true;
-  if (bare == ".inf" || bare == "inf") return value = INFINITY, true;
-  const char* const end = text.data() + text.size();
-  const auto result = std::from_chars(text.data(), end, value);
-  return result.ec == std::errc() && result.ptr == end;
-}
-
 double finite(const YAML::Node& node, const std::string& entry, const std::string& file) {
   double value = 0;
-  if (!node.IsScalar() || !read_number(node.Scalar(), value))
+  if (!node.IsScalar() || !parse_number(node.Scalar(), value))
     throw BadInput(file + ": " + entry + " is not a number");
   if (!std::isfinite(value)) throw BadInput(file + ": " + entry + " is not finite");
   return value;
@@ -106,12 +91,32 @@ void append(const YAML::Node& list, const std::string& entry, const std::string&
 
 }  // namespace
 
+// The syntax is strict except for a leading plus and a trailing point ("0."),
+// which OpenCV writes. The words of YAML and OpenCV for NaN and infinity are accepted as such.
+bool parse_number(std::string text, double& value) {
+  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  if (!text.empty() && text[0] == '+') {
+    text.erase(0, 1);
+    if (!text.empty() && text[0] == '-') return false;
+  }
+  const std::string bare = !text.empty() && text[0] == '-' ? text.substr(1) : text;
+  if (bare == ".nan" || bare == "nan") return value = NAN, true;
+  if (bare == ".inf" || bare == "inf") return value = INFINITY, true;
+  const char* const end = text.data() + text.size();
+  const auto result = std::from_chars(text.data(), end, value);
+  return result.ec == std::errc() && result.ptr == end;
+}
+
 YAML::Node parse_yaml(const std::string& text, const std::string& file) {
   std::string body = text;
   if (body.compare(0, 3, "\xef\xbb\xbf") == 0) body.erase(0, 3);
-  // "%YAML:1.0" is replaced by a comment of the same length, so that line numbers in messages stay
-  // correct.
-  if (body.compare(0, 6, "%YAML:") == 0) body[0] = '#';
+  // OpenCV's "%YAML:1.0" becomes a comment of the same length, so that line numbers in messages
+  // stay correct.
+  if (body.compare(0, 5, "%YAML") == 0) body[0] = '#';
+  // JSON may be indented by tabs, YAML may not.
+  const size_t first = body.find_first_not_of(" \t\r\n");
+  if (first != std::string::npos && body[first] == '{')
+    std::replace(body.begin(), body.end(), '\t', ' ');
   YAML::Node root;
   try {
     std::istringstream stream(body);
@@ -131,8 +136,12 @@ double number_at(const YAML::Node& map, const std::string& entry, const std::str
   return finite(find(map, entry, file), entry, file);
 }
 
-int32_t side_at(const YAML::Node& map, const std::string& entry, const std::string& file) {
-  const double value = number_at(map, entry, file);
+double number_of(const YAML::Node& value, const std::string& entry, const std::string& file) {
+  if (value.IsNull()) throw BadInput(file + ": " + entry + " is missing");
+  return finite(value, entry, file);
+}
+
+int32_t side_of(double value, const std::string& entry, const std::string& file) {
   if (value == 0) throw BadInput(file + ": " + entry + " is 0");
   if (value != std::floor(value) || value < 1 || value > 1e6)
     throw BadInput(file + ": " + entry + " is not a number of pixels");
@@ -144,27 +153,50 @@ void require_focal(double value, const std::string& entry, const std::string& fi
   if (value < 0) throw BadInput(file + ": " + entry + " is negative");
 }
 
+std::vector<double> shape_of(const YAML::Node& value, const std::string& entry,
+                             const std::string& file) {
+  std::vector<double> shape;
+  if (!value.IsMap()) return shape;
+  if (value["sizes"]) {
+    YAML::Node sizes = value["sizes"];
+    if (!sizes.IsSequence()) {
+      sizes = YAML::Node(YAML::NodeType::Sequence);
+      sizes.push_back(value["sizes"]);
+    }
+    append(sizes, entry + ".sizes", file, shape);
+  } else if (value["rows"] && value["cols"]) {
+    for (const char* side : {"rows", "cols"})
+      shape.push_back(number_at(value, side, file + ": " + entry));
+  }
+  return shape;
+}
+
 std::vector<double> numbers_at(const YAML::Node& map, const std::string& entry,
                                const std::string& file) {
-  const YAML::Node node = find(map, entry, file);
-  YAML::Node list = node;
-  if (node.IsMap()) {
-    const YAML::Node data = node["data"];
+  return numbers_of(find(map, entry, file), entry, file);
+}
+
+std::vector<double> numbers_of(const YAML::Node& value, const std::string& entry,
+                               const std::string& file) {
+  YAML::Node list = value;
+  if (value.IsMap()) {
+    const YAML::Node data = value["data"];
     if (!data) throw BadInput(file + ": " + entry + " has no data");
     list.reset(data);
   }
   if (!list.IsSequence()) throw BadInput(file + ": " + entry + " is not a list of numbers");
   std::vector<double> values;
   append(list, entry, file, values);
-  if (node.IsMap() && node["rows"] && node["cols"]) {
-    const double rows = number_at(node, "rows", file + ": " + entry);
-    const double cols = number_at(node, "cols", file + ": " + entry);
-    if (rows * cols != static_cast<double>(values.size()))
-      throw BadInput(file + ": " + entry + " has " + std::to_string(values.size()) +
-                     " numbers, not rows x cols = " + node["rows"].Scalar() + " x " +
-                     node["cols"].Scalar());
-  }
-  return values;
+  const std::vector<double> shape = shape_of(value, entry, file);
+  double count = 1;
+  for (const double side : shape) count *= side;
+  const bool is_ros278 = shape == std::vector<double>{1, 5} && values.size() == 8;
+  if (shape.empty() || count == static_cast<double>(values.size()) || is_ros278) return values;
+  std::string sides;
+  for (const double side : shape)
+    sides += (sides.empty() ? "" : " x ") + std::to_string(static_cast<long>(side));
+  throw BadInput(file + ": " + entry + " has " + std::to_string(values.size()) + " numbers, not " +
+                 (value["sizes"] ? "sizes" : "rows x cols") + " = " + sides);
 }
 
 }  // namespace cli

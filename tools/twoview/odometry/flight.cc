@@ -73,7 +73,10 @@ void Flight::Free::operator()(void* memory) const { std::free(memory); }
 Flight::Flight(FrameSource& source, const FlightOptions& options)
     : source_(source), options_(options) {
   tv_odometry_state_init(&state_);
-  if (!options.camera_file.empty()) file_camera_ = load_camera(options.camera_file);
+  if (options.camera_file.empty()) return;
+  const CameraFile file = load_camera_file(options.camera_file);
+  file_camera_ = file.of("");
+  if (!file.note().empty()) notes_.push_back(file.note());
 }
 
 Flight::~Flight() = default;
@@ -112,6 +115,12 @@ void Flight::start(const SourceFrame& first) {
       throw BadInput("--camera is required, or " + focal_option(frame.exif) + ": " +
                      source_.kind() + " does not describe its camera");
     file_camera_ = *camera;
+  } else {
+    const int width = frame.luma.cols, height = frame.luma.rows;
+    const std::string note = scaled_note(file_camera_, options_.camera_file, width, height);
+    file_camera_ = fitted(file_camera_, options_.camera_file, width, height, frame.name,
+                          options_.scales_camera);
+    if (!note.empty()) notes_.push_back(note);
   }
   prepare(frame);
   camera_ = resized(file_camera_, frame.luma.cols, frame.luma.rows);

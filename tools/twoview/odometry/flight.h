@@ -73,9 +73,10 @@ struct FlightOptions {
   tv_odometry_options odometry;
   int max_frames = 0;  // 0: all
   int every = 1;
-  int resize = 0;           // longer side, pixels; 0: as they are
-  std::string camera_file;  // empty: the source's own camera, or
-  double focal_35mm = 0;    // a pinhole's of this focal length, millimetres; 0: none
+  int resize = 0;              // longer side, pixels; 0: as they are
+  bool scales_camera = false;  // whether camera_file may be for another size of the picture
+  std::string camera_file;     // empty: the source's own camera, or
+  double focal_35mm = 0;       // a pinhole's of this focal length, millimetres; 0: none
 };
 
 class Flight {
@@ -106,6 +107,8 @@ class Flight {
   // Whether attitudes were given, so that the map's z axis points down.
   bool is_upright() const { return is_upright_; }
   const tv_odometry_state& state() const { return state_; }
+  // What was decided of the camera file: what was left out of it, and that it was scaled.
+  const std::vector<std::string>& notes() const { return notes_; }
   // As frames are tracked; after finish() with the principal point as the odometry has moved it.
   const tv_camera& camera() const { return camera_; }
   // The camera of the frames as the source gives them, before they are scaled down.
@@ -137,6 +140,7 @@ class Flight {
 
   FrameSource& source_;
   FlightOptions options_;
+  std::vector<std::string> notes_;
   tv_camera file_camera_{}, camera_{};  // of the frames' files, and as they are tracked
   struct Free {
     void operator()(void* memory) const;

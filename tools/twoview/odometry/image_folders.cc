@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "base/output.h"
 #include "files/camera_file.h"
+#include "files/camera_formats.h"
 #include "files/camera_set.h"
 #include "files/image_file.h"
 #include "files/yaml_values.h"
@@ -126,10 +127,16 @@ void read_list(Folder& folder, const std::string& file, double scale, std::strin
   folder.files.push_back(path);
 }
 
+void add_note(Folder& folder, const std::string& note) {
+  if (!note.empty()) folder.note += (folder.note.empty() ? "" : "; ") + note;
+}
+
 void add_cameras(Folder& folder) {
   const std::string path = (fs::path(folder.path) / "cameras.yaml").string();
   if (!is_file(path)) return;
-  folder.cameras = load_camera_set(path);
+  std::vector<std::string> left_out;
+  folder.cameras = load_camera_set(path, &left_out);
+  add_note(folder, left_out_note(path, left_out));
   folder.camera_name = path;
   folder.files.push_back(path);
 }
@@ -153,43 +160,15 @@ void add_measurements(Folder& folder) {
 void add_euroc_camera(Folder& folder) {
   const std::string path = (fs::path(folder.path) / "mav0/cam0/sensor.yaml").string();
   if (!is_file(path)) return;
-  const YAML::Node root = parse_yaml(read_file(path, 1 << 20), path);
-  const auto exactly = [&](const char* entry, size_t count) {
-    const std::vector<double> n = numbers_at(root, entry, path);
-    if (n.size() != count)
-      throw BadInput(path + ": " + entry + " has " + std::to_string(n.size()) + " numbers, not " +
-                     std::to_string(count));
-    return n;
-  };
-  const std::vector<double> size = exactly("resolution", 2), K = exactly("intrinsics", 4),
-                            k = exactly("distortion_coefficients", 4);
-  tv_camera camera{};
-  for (const double side : size)
-    if (!(side >= 1 && side <= kMaxSide && side == std::floor(side)))
-      throw BadInput(path + ": resolution is not two whole numbers of pixels");
-  camera.width = static_cast<int32_t>(size[0]);
-  camera.height = static_cast<int32_t>(size[1]);
-  camera.fx = K[0];
-  camera.fy = K[1];
-  camera.cx = K[2];
-  camera.cy = K[3];
-  std::copy(k.begin(), k.end(), camera.k);
-  const YAML::Node node = root["distortion_model"];
-  const std::string model = node && node.IsScalar() ? node.Scalar() : "";
-  if (model == "equidistant") {
-    camera.model = TV_CAMERA_KANNALA_BRANDT;
-  } else if (model == "radial-tangential" || model == "radtan" || model == "plumb_bob") {
-    camera.model = TV_CAMERA_BROWN_CONRADY;
-  } else {
-    throw BadInput(path + ": distortion_model '" + model +
-                   "' is neither radial-tangential nor equidistant");
-  }
-  check(tv_camera_check(&camera), path);
-  folder.cameras.emplace_back("cam0", camera);
+  const CameraFile file = load_camera_file(path);
+  folder.cameras.emplace_back("cam0", file.of(""));
   folder.camera_name = path;
   folder.files.push_back(path);
-  if (!root["T_BS"]) return;
-  const std::vector<double> T = exactly("T_BS", 16);
+  add_note(folder, file.note());
+  if (!file.root["T_BS"]) return;
+  const std::vector<double> T = numbers_at(file.root, "T_BS", path);
+  if (T.size() != 16)
+    throw BadInput(path + ": T_BS has " + std::to_string(T.size()) + " numbers, not 16");
   folder.body_from_camera.emplace();
   std::copy(T.begin(), T.begin() + 12, folder.body_from_camera->begin());
 }

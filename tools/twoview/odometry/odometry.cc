@@ -313,6 +313,7 @@ int odometry(Arguments& a) {
     });
   }
   if (flight.frames().empty()) throw BadInput("no frame came from " + source->kind());
+  for (const std::string& note : flight.notes()) common.note(note);
   flight.finish(stop);
   FlightResult result =
       result_of(flight, truth, wanted < 0 ? static_cast<int>(flight.frames().size()) : wanted);
@@ -333,7 +334,8 @@ int odometry(Arguments& a) {
     if (has_map) make_colmap_files(result, *colmap);
   }
   if (common.json) print(json_text(result.json));
-  if (common.speaks()) print(summary(result, *source, files, has_map));
+  const std::string notes = common.note_lines();
+  if (common.speaks()) print(notes + summary(result, *source, files, has_map));
   files.commit();
   files.remove_others(kFiles);
   if (colmap) {
@@ -364,6 +366,7 @@ void add_odometry(CLI::App& program, Run& run) {
       ->type_name("SOURCE");
   verb->add_option("--camera", a->camera, "camera file; without: what the source says of it")
       ->type_name("FILE");
+  add_scale_camera(*verb, a->flight.scales_camera);
   add_focal_35mm(*verb, a->flight.focal_35mm);
   verb->add_option("--truth", a->truth, "true poses of TUM, EuRoC or KITTI to compare with")
       ->type_name("FILE");

@@ -318,6 +318,12 @@ void add_focal_35mm(CLI::App& verb, double& focal_35mm) {
       ->type_name("[" + number_text(kShortestFilm) + ", " + number_text(kLongestFilm) + "]");
 }
 
+void add_scale_camera(CLI::App& verb, bool& scales_camera) {
+  verb.add_flag("--scale-camera", scales_camera,
+                "scale a camera file that is for another size of the same picture (not for a "
+                "crop)");
+}
+
 CLI::Option* add_number(CLI::App& verb, const char* name,
                         std::variant<int32_t*, uint64_t*, double*> value, double low, double high,
                         const char* help) {

@@ -72,6 +72,9 @@ double number_of_flag(const std::string& flag, const std::string& text, double l
 // Adds --focal-35mm to a verb, in millimetres.
 void add_focal_35mm(CLI::App& verb, double& focal_35mm);
 
+// The flag --scale-camera, beside an option --camera.
+void add_scale_camera(CLI::App& verb, bool& scales_camera);
+
 // Adds --name to a verb: a number in [low, high], by default the value as it is now.
 CLI::Option* add_number(CLI::App& verb, const char* name,
                         std::variant<int32_t*, uint64_t*, double*> value, double low, double high,

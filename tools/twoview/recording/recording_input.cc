@@ -40,13 +40,12 @@ std::vector<double> optional_numbers(const YAML::Node& root, const std::string& 
   return numbers;
 }
 
-// The entries of a camera file that is YAML; an empty map for other formats and without a file.
+// The entries of a camera file; an empty map for a format without entries and without a file.
 YAML::Node mount_entries(const std::string& file) {
   if (file.empty()) return YAML::Node(YAML::NodeType::Map);
   const std::string path = camera_path(file);
-  const std::string text = read_file(path, kMaxFileBytes);
-  if (parse_camera_file(text, path).is_colmap) return YAML::Node(YAML::NodeType::Map);
-  return parse_yaml(text, path);
+  const CameraFile camera = parse_camera_file(read_file(path, kMaxFileBytes), path);
+  return camera.root.IsMap() ? camera.root : YAML::Node(YAML::NodeType::Map);
 }
 
 // The mount from the command line, else from the camera file, else a camera at the body's origin

@@ -267,7 +267,7 @@ Json calibration_json(const std::vector<BoardView>& views, const Calibration& c,
 }
 
 // The entries focal_sigma and center_sigma of the camera file: what the calibration's own standard
-// deviations are, as sigmas_from_yaml reads them.
+// deviations are, as take_sigmas (files/camera_entries.h) reads them.
 std::string sigmas_yaml(const Calibration& c) {
   if (c.sigma.size() < 4) return "";
   const double focal = std::max(c.sigma[0] / c.camera.fx, c.sigma[1] / c.camera.fy);

@@ -10,7 +10,7 @@ namespace cli {
 namespace {
 
 ImageCamera film(ImageCamera::Source source, double focal_35mm, const ImageFacts& image) {
-  return {source, film_camera(focal_35mm, image.width, image.height), kFilm, "", focal_35mm};
+  return {source, film_camera(focal_35mm, image.width, image.height), kFilm, "", focal_35mm, {}};
 }
 
 }  // namespace
@@ -26,6 +26,7 @@ void CameraOptions::add_to(CLI::App& verb) {
       ->type_name("FILE");
   verb.add_option("--camera0", of[0], "camera of image 0")->type_name("FILE");
   verb.add_option("--camera1", of[1], "camera of image 1")->type_name("FILE");
+  add_scale_camera(verb, scales_camera);
   add_focal_35mm(verb, focal_35mm);
 }
 
@@ -50,10 +51,14 @@ ImageCameras CameraOptions::cameras_of(const ImageFacts& image0, const ImageFact
     const CameraFile file1 = given[1] == given[0] ? file0 : load_camera_file(given[1]);
     const CameraFile* const read[2] = {&file0, &file1};
     for (size_t i = 0; i < 2; ++i) {
-      cameras[i] = {ImageCamera::kFile, read[i]->of(images[i]->name), read[i]->sigmas, given[i], 0};
-      if (images[i]->width > 0)
-        require_size(cameras[i].camera, given[i], images[i]->width, images[i]->height,
-                     images[i]->name);
+      const tv_camera camera = read[i]->of(images[i]->name);
+      const int width = images[i]->width, height = images[i]->height;
+      cameras[i] = {ImageCamera::kFile, camera, read[i]->sigmas, given[i], 0, {}};
+      if (!read[i]->note().empty()) cameras[i].notes.push_back(read[i]->note());
+      if (width == 0) continue;
+      cameras[i].camera = fitted(camera, given[i], width, height, images[i]->name, scales_camera);
+      const std::string scaled = scaled_note(camera, given[i], width, height);
+      if (!scaled.empty()) cameras[i].notes.push_back(scaled);
     }
   } else if (focal_35mm > 0) {
     for (size_t i = 0; i < 2; ++i) cameras[i] = film(ImageCamera::kFocal, focal_35mm, *images[i]);

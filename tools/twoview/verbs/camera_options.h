@@ -6,6 +6,7 @@
 #include <array>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "files/camera_file.h"
 #include "files/image_file.h"
@@ -17,8 +18,9 @@ struct ImageCamera {
   enum Source { kNone, kFile, kFocal, kExif } source = kNone;
   tv_camera camera{};
   CalibrationSigmas sigmas{0, 0};
-  std::string file;       // the camera file as given
-  double focal_35mm = 0;  // millimetres, where source is kFocal or kExif
+  std::string file;                // the camera file as given
+  double focal_35mm = 0;           // millimetres, where source is kFocal or kExif
+  std::vector<std::string> notes;  // of the file: what was left out, and that it was scaled
 };
 using ImageCameras = std::array<ImageCamera, 2>;
 
@@ -33,6 +35,7 @@ ImageFacts facts_of(const Picture& picture);
 struct CameraOptions {
   std::string both, of[2];
   double focal_35mm = 0;
+  bool scales_camera = false;
 
   void add_to(CLI::App& verb);
   // The camera file of each image; both are empty if no camera file is given. Throws BadInput if

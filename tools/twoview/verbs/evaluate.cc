@@ -33,6 +33,7 @@ struct Arguments {
   Common common;
   std::string pairs, images, camera;
   double focal_35mm = 0;
+  bool scales_camera = false;
   int max_pairs = 0;
 };
 
@@ -62,6 +63,7 @@ struct Cameras {
   std::optional<CameraFile> file;
   double focal_35mm = 0;
   NamedCameras set;
+  bool scales_camera = false;
 
   tv_camera of(const std::string& name, const Picture& picture,
                const std::array<double, 9>* K) const {
@@ -72,9 +74,7 @@ struct Cameras {
                      ": no K on its line and no cameras.yaml beside the list; give --camera or " +
                      focal_option(picture.exif));
     if (!file) return camera_of_image(set, name, width, height, K);
-    const tv_camera camera = file->of(name);
-    require_size(camera, file->path, width, height, name);
-    return camera;
+    return fitted(file->of(name), file->path, width, height, name, scales_camera);
   }
 };
 
@@ -341,12 +341,16 @@ Cameras load_cameras(Arguments& a) {
   CalibrationSigmas sigmas = kPlainFile;
   if (!a.camera.empty()) {
     cameras.file = load_camera_file(a.camera);
+    cameras.scales_camera = a.scales_camera;
     sigmas = cameras.file->sigmas;
+    if (!cameras.file->note().empty()) a.common.note(cameras.file->note());
   } else if (a.focal_35mm > 0) {
     sigmas = kFilm;
     cameras.focal_35mm = a.focal_35mm;
   } else if (fs::exists(set_path)) {
-    cameras.set = load_camera_set(set_path.string());
+    std::vector<std::string> left_out;
+    cameras.set = load_camera_set(set_path.string(), &left_out);
+    if (!left_out.empty()) a.common.note(left_out_note(set_path.string(), left_out));
   }
   tv_estimate_options& options = a.common.options.estimate;
   options.focal_sigma0 = options.focal_sigma1 = sigmas.focal;
@@ -410,6 +414,7 @@ void add_evaluate(CLI::App& program, Run& run) {
   verb->add_option("--camera", a->camera,
                    "camera file of all images, in place of cameras.yaml and of the Ks in the list")
       ->type_name("FILE");
+  add_scale_camera(*verb, a->scales_camera);
   add_focal_35mm(*verb, a->focal_35mm);
   verb->add_option("--max-pairs", a->max_pairs, "take the first N pairs; 0: all")
       ->check([](const std::string& count) {

@@ -128,6 +128,8 @@ ImageCameras load_inputs(Arguments& a, RecordingInput* recording, Session& sessi
     cameras = choose_cameras(a, outcome.picture);
     set_calibration_sigmas(a.common.options, cameras);
   }
+  for (const ImageCamera& camera : cameras)
+    for (const std::string& line : camera.notes) a.common.note(line);
   outcome.has_cameras = cameras[0].source != ImageCamera::kNone;
   outcome.has_camera_files = cameras[0].source == ImageCamera::kFile;
   for (size_t i = 0; i < 2; ++i) {

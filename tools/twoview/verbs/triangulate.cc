@@ -105,6 +105,8 @@ ImageCameras matched_cameras(Arguments& a, const KnownPose& pose) {
     throw BadInput("cameras are needed: " + without.name + " " + without.exif.gap +
                    "; give --camera or --focal-35mm");
   }
+  for (const ImageCamera& camera : cameras)
+    for (const std::string& line : camera.notes) a.common.note(line);
   const std::string note = exif_note(cameras);
   if (!note.empty()) a.common.note(note);
   for (ImageCamera& camera : cameras) {

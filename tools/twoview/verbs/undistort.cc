@@ -29,6 +29,7 @@ struct Arguments {
   double focal_35mm = 0, focal_scale = 1;
   int resize = 0;  // longer side of the results, pixels; 0: as the images are
   bool mask = false;
+  bool scales_camera = false;
 };
 
 // The position in the old image of each pixel of the new one, by the library's lens models.
@@ -88,15 +89,23 @@ std::vector<std::string> result_names(const std::vector<std::string>& images, bo
 }
 
 // The camera of the images, which are all of one size.
-tv_camera lens_of(const Arguments& a) {
+tv_camera lens_of(Arguments& a) {
   const bool has_focal = a.focal_35mm > 0;
   if (!a.camera.empty() && has_focal) throw BadInput("give either --camera or --focal-35mm");
   if (a.camera.empty() && !has_focal)
     throw BadInput("give either --camera or " + focal_option(load_picture(a.images[0]).exif));
   const std::string name = fs::path(a.images[0]).filename().string();
-  if (!a.camera.empty()) return load_camera(a.camera, name);
+  if (!a.camera.empty() && !a.scales_camera) {
+    const CameraFile file = load_camera_file(a.camera);
+    if (!file.note().empty()) a.common.note(file.note());
+    return file.of(name);
+  }
   const cv::Mat image = load_pixels(a.images[0]);
-  return film_camera(a.focal_35mm, image.cols, image.rows);
+  if (a.camera.empty()) return film_camera(a.focal_35mm, image.cols, image.rows);
+  const tv_camera camera = load_camera(a.camera, name);
+  const std::string note = scaled_note(camera, a.camera, image.cols, image.rows);
+  if (!note.empty()) a.common.note(note);
+  return fitted(camera, a.camera, image.cols, image.rows, a.images[0], true);
 }
 
 // The camera's name for messages.
@@ -130,7 +139,7 @@ int undistort(Arguments& a) {
   const Progress progress(!common.quiet && a.images.size() > 1);
   for (size_t i = 0; i < a.images.size(); ++i) {
     cv::Mat image = load_pixels(a.images[i]);
-    require_size(whole, camera_name(a), image.cols, image.rows, a.images[i]);
+    fitted(whole, camera_name(a), image.cols, image.rows, a.images[i], false);
     if (size != image.size()) {
       cv::Mat smaller;
       cv::resize(image, smaller, size, 0, 0, cv::INTER_AREA);
@@ -159,13 +168,14 @@ int undistort(Arguments& a) {
     json["version"] = tv_version_string();
     print(json_text(json));
   }
+  const std::string notes = common.note_lines();
   if (common.speaks()) {
     char text[160];
     std::snprintf(text, sizeof text, "%zu undistorted, %.1f %% of the pixels seen\nfiles        ",
                   names.size(), 100 * share);
     std::string line = text + files.folder().string() + ":";
     for (const std::string& name : files.names()) line += " " + name;
-    print(line + "\n");
+    print(notes + line + "\n");
   }
   files.commit();
   return 0;
@@ -182,6 +192,7 @@ void add_undistort(CLI::App& program, Run& run) {
                    "their camera: YAML of OpenCV, ROS or Kalibr, cameras.yaml, or COLMAP's "
                    "cameras.txt; FILE:NAME takes one of several")
       ->type_name("FILE");
+  add_scale_camera(*verb, a->scales_camera);
   add_focal_35mm(*verb, a->focal_35mm);
   verb->add_option("--resize", a->resize,
                    "scale images and camera down to this longer side, pixels; 0: as they are")

@@ -11,6 +11,7 @@ from typing import Optional
 
 import numpy as np
 import twoview as tv
+from twoview import camera_files
 
 HALF_PIXEL = 0.5
 _TO_COLMAP = np.array([[1, 0, HALF_PIXEL], [0, 1, HALF_PIXEL], [0, 0, 1]])
@@ -36,7 +37,12 @@ class ColmapCamera:
     params: tuple
 
 
-MODEL_IDS = {"PINHOLE": 1, "OPENCV": 4, "OPENCV_FISHEYE": 5, "FULL_OPENCV": 6}
+# The numbers of COLMAP 3.8's models and of those that later versions added.
+MODEL_IDS = {name: number for number, name in enumerate((
+    "SIMPLE_PINHOLE", "PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "OPENCV_FISHEYE",
+    "FULL_OPENCV", "FOV", "SIMPLE_RADIAL_FISHEYE", "RADIAL_FISHEYE", "THIN_PRISM_FISHEYE",
+    "RAD_TAN_THIN_PRISM_FISHEYE", "SIMPLE_DIVISION", "DIVISION", "SIMPLE_FISHEYE", "FISHEYE",
+    "EUCM", "EQUIRECTANGULAR"))}
 
 
 def camera_to_colmap(camera):
@@ -55,38 +61,11 @@ def camera_to_colmap(camera):
     )
 
 
-# For each of COLMAP's models, the indices of fx fy cx cy among its parameters, and the indices of
-# its other parameters in twoview's k.
-_PINHOLE, _BROWN, _FISHEYE = (tv.CameraModel.PINHOLE, tv.CameraModel.BROWN_CONRADY,
-                              tv.CameraModel.KANNALA_BRANDT)
-_MODELS = {
-    "SIMPLE_PINHOLE": (_PINHOLE, (0, 0, 1, 2), ()), "PINHOLE": (_PINHOLE, (0, 1, 2, 3), ()),
-    "SIMPLE_RADIAL": (_BROWN, (0, 0, 1, 2), (0,)), "RADIAL": (_BROWN, (0, 0, 1, 2), (0, 1)),
-    "OPENCV": (_BROWN, (0, 1, 2, 3), (0, 1, 2, 3)),
-    "FULL_OPENCV": (_BROWN, (0, 1, 2, 3), (0, 1, 2, 3, 4, 5, 6, 7)),
-    "SIMPLE_RADIAL_FISHEYE": (_FISHEYE, (0, 0, 1, 2), (0,)),
-    "RADIAL_FISHEYE": (_FISHEYE, (0, 0, 1, 2), (0, 1)),
-    "OPENCV_FISHEYE": (_FISHEYE, (0, 1, 2, 3), (0, 1, 2, 3)),
-}
-
-
 def camera_from_colmap(camera, name):
-    """Converts a ColmapCamera to a twoview.Camera. Raises ValueError for a lens that twoview has no
-    model of."""
-    if camera.model not in _MODELS:
-        raise ValueError(f"{name}: COLMAP's {camera.model} is not one of {', '.join(_MODELS)}")
-    model, places, lens = _MODELS[camera.model]
-    count = max(places) + 1 + len(lens)
-    if len(camera.params) != count:
-        raise ValueError(f"{name}: {camera.model} has {count} parameters, not {len(camera.params)}")
-    fx, fy, cx, cy = (float(camera.params[i]) for i in places)
-    k = [0.0] * 8
-    for place, value in zip(lens, camera.params[max(places) + 1:]):
-        k[place] = float(value)
-    if model == _BROWN and not any(k):
-        model = _PINHOLE
-    return tv.Camera(camera.width, camera.height, fx, fy, cx - HALF_PIXEL, cy - HALF_PIXEL, model,
-                     () if model == _PINHOLE else tuple(k))
+    """Converts a ColmapCamera to a twoview.Camera. Raises ValueError that begins with `name` for a
+    lens that twoview has no model of."""
+    return camera_files.colmap_camera(camera.model, camera.width, camera.height, camera.params,
+                                      name)
 
 
 def keypoints_to_colmap(keypoints):

@@ -164,8 +164,6 @@ def _scratch_folder(path):
 def read_cameras(database):
     """Reads the table `cameras` as {camera_id: ColmapCamera}."""
     names = {number: name for name, number in MODEL_IDS.items()}
-    names.update({0: "SIMPLE_PINHOLE", 2: "SIMPLE_RADIAL", 3: "RADIAL", 8: "SIMPLE_RADIAL_FISHEYE",
-                  9: "RADIAL_FISHEYE"})
     rows = database.execute("SELECT camera_id, model, width, height, params FROM cameras")
     return {camera_id: ColmapCamera(names.get(model, f"model {model}"), width, height,
                                     tuple(np.frombuffer(params, np.float64).tolist()))
