@@ -192,7 +192,7 @@ def checked_camera(width: int, height: int, K: Sequence[float], lens: CameraMode
                               "in another unit?")
         if not -FARTHEST_CENTER * side <= center <= (1 + FARTHEST_CENTER) * side:
             raise FormatError(f"{where}: c{axis} is {center:g}, far outside an image of {side} "
-                              "pixels: is the camera of another picture?")
+                              "pixels: is this principal point of another picture?")
     # An equidistant lens with four zero coefficients is no pinhole.
     if lens == CameraModel.BROWN_CONRADY and not any(k):
         lens = CameraModel.PINHOLE

@@ -269,9 +269,9 @@ def camera_set_of(root: Mapping[str, Any], name: str,
 _ORB_SLAM = re.compile(r"(Camera[0-9]*)\.(.+)")
 # Of ORB-SLAM's, stella_vslam's and VINS's settings: the parts that are not of the camera.
 _OTHER_SETTINGS = re.compile(
-    r"(IMU|Viewer|ORBextractor|System|Stereo|RGBD|Tracking|Mapping|Feature|Initializer|PangolinViewer"
-    r"|SocketPublisher|Preprocessing|KeyframeInserter|Relocalizer|LoopDetector|LoopBundleAdjuster"
-    r"|GraphOptimizer|MarkerModel|loopClosing)(\..*)?")
+    r"(IMU|Viewer|ORBextractor|System|Stereo|RGBD|Tracking|Mapping|Feature|Initializer"
+    r"|PangolinViewer|SocketPublisher|Preprocessing|KeyframeInserter|Relocalizer|LoopDetector"
+    r"|LoopBundleAdjuster|GraphOptimizer|MarkerModel|loopClosing)(\..*)?")
 
 
 def _orb_slam(root: Mapping[str, Any], name: str, read: _Read) -> bool:
@@ -665,7 +665,8 @@ def format_cameras(cameras: Union[Camera, Mapping[str, Camera]], format: str = "
     calibration is, which "opencv", "opencv-xml" and "ros" have entries for.
     Returns the text.
     Raises ValueError for another format, for a lens or sigmas that the format does not have, for
-    several cameras in a format of one, and for numbers that read_cameras refuses; TV_ERR_CAMERA for a camera that the library refuses."""
+    several cameras in a format of one, and for numbers that read_cameras refuses; TV_ERR_CAMERA for
+    a camera that the library refuses."""
     if format not in _WRITERS:
         raise ValueError(f"format '{format}' is not one of {', '.join(FORMATS)}")
     write, has_names, has_sigmas = _WRITERS[format]

@@ -209,21 +209,23 @@ class CameraFiles(cli.CliTest):
                 ("reconstruct", self.a, self.b), ("undistort", self.a),
                 ("evaluate", pairs, "--images", self.folder), ("odometry", frames, "--fps", "10")):
             with self.subTest(verb=verb):
-                run = lambda *more: self.run_program(verb, *arguments, *more, "-o", self.out)
+                out = self.folder / f"out_{verb}"
+                run = lambda *more: self.run_program(verb, *arguments, *more, "-o", out)
                 self.assert_refused(run("--camera", large), f"{WIDTH}x{HEIGHT}",
-                                    f"{2 * WIDTH}x{2 * HEIGHT}", "--scale-camera")
-                self.assert_refused(run("--camera", wide, "--scale-camera"), "does not help")
+                                    f"{2 * WIDTH}x{2 * HEIGHT}", "--scale-camera", out=out)
+                self.assert_refused(run("--camera", wide, "--scale-camera"), "does not help",
+                                    out=out)
                 done = run("--camera", large, "--scale-camera")
                 self.assertNotEqual(done.returncode, 2, done.stderr)
                 if verb == "reconstruct":
-                    found = self.result()
+                    found = json.loads((out / "result.json").read_text())
                     self.succeed(self.reconstruct())
                     for key in ("R", "t", "num_inliers"):
                         self.assertEqual(found[key], self.result()[key])
                     self.assertIn(b"is scaled from", done.stdout)
                 if verb == "undistort":
-                    camera = (self.out / "camera.yaml").read_text()
-                    self.assertIn(f"data: [ {cli.FOCAL}, 0, {(WIDTH - 1) / 2}, ", camera)
+                    camera = (out / "camera.yaml").read_text()
+                    self.assertIn(f"data: [ {cli.FOCAL:g}, 0, {(WIDTH - 1) / 2}, ", camera)
 
     def test_every_verb_takes_them(self):
         chain = self.write("chain.yaml", kalibr("a b", "none", ()))

@@ -17,7 +17,8 @@ identity's, and det R must be positive. A file without a pair is refused. The me
 line has the line's number.
 
 Camera file. docs/formats.md states the formats and their entries. A name that is not known and may
-concern the lens is refused; others are left out. A lens of Brown and Conrady whose coefficients are all 0 is a pinhole. If a matrix gives
+concern the lens is refused; others are left out. A lens of Brown and Conrady whose coefficients are
+all 0 is a pinhole. If a matrix gives
 rows and cols, their product must equal its number of values. A file without a camera is refused.
 
 YAML. The first document of a file is read, as a map. A name given twice and an alias are refused.

@@ -718,8 +718,8 @@ void settle_camera(tv_camera& camera, const std::string& where) {
     if (!(axis.center >= -kFarthestCenter * axis.side &&
           axis.center <= (1 + kFarthestCenter) * axis.side)) {
       std::snprintf(text, sizeof text,
-                    ": c%s is %g, far outside an image of %d pixels: is the camera of another "
-                    "picture?",
+                    ": c%s is %g, far outside an image of %d pixels: is this principal point of "
+                    "another picture?",
                     axis.axis, axis.center, axis.side);
       throw BadInput(where + text);
     }
