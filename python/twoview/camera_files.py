@@ -88,8 +88,7 @@ def parse_yaml(text: str, name: str) -> dict[str, Any]:
         raise ImportError("reading a camera file needs the package PyYAML (pip install pyyaml, or "
                           "apt install python3-yaml)") from None
     text = text[1:] if text.startswith("\ufeff") else text
-    # OpenCV's first line, '%YAML:1.0', is no valid YAML; '%YAML 1.2', of OpenCV 5, is none that
-    # PyYAML knows.
+    # OpenCV's first line, '%YAML:1.0', is no valid YAML; OpenCV 5's, '%YAML 1.2', is.
     if text.startswith("%YAML"):
         text = "#" + text[1:]
     if text.lstrip().startswith("{"):  # JSON may be indented by tabs, YAML may not
@@ -374,13 +373,14 @@ def _refuse_by_name(root: Mapping[str, Any], name: str) -> None:
 
 def _refuse_text_by_name(text: str, name: str) -> None:
     """Refuses the text files of other programs, with what to do."""
-    lines = [line.split() for line in text.split("\n") if line.strip()]
-    if text.startswith("# oST") or lines[:1] == [["[image]"]]:
+    first = next((line.split() for line in text.split("\n") if line.strip()), [])
+    if text.startswith("# oST") or first == ["[image]"]:
         raise FormatError(f"{name}: ROS's INI (oST); convert it: rosrun camera_calibration_parsers "
                           "convert camera.ini camera.yaml")
+    if first and re.fullmatch(r"\[[A-Z0-9_]+\]", first[0]):
+        raise FormatError(f"{name}: an INI file, as ZED's cameras have; {_WRITE_OURS}")
     if text.startswith("Pix4D"):
         raise FormatError(f"{name}: Pix4D's camera; {_WRITE_OURS}")
-    first = lines[0] if lines else []
     is_dso = bool(first) and first[0] in ("Pinhole", "RadTan", "FOV", "EquiDistant", "ATAN",
                                           "KannalaBrandt")
     numbers = [word for word in first if re.fullmatch(r"[-+0-9.eE]+", word)]
@@ -398,7 +398,8 @@ def _svo(root: Mapping[str, Any], name: str, read: _Read) -> bool:
         inner = item.get("camera", item) if isinstance(item, dict) else None
         where = f"{name}: cameras[{i}]"
         if not isinstance(inner, dict) or not is_camera(inner):
-            raise FormatError(f"{where} is no camera with intrinsics")
+            raise FormatError(f"{where} is no camera with intrinsics (OKVIS's are not read); "
+                              + _WRITE_OURS)
         label = inner.get("label")
         camera_name = label if isinstance(label, str) else f"cam{i}"
         if camera_name in read.cameras:

@@ -35,6 +35,8 @@ Which entry serves an image (choose_entry):
 import math
 import os
 import re
+import sys
+import warnings
 from dataclasses import dataclass
 from typing import Optional
 
@@ -165,15 +167,30 @@ def _plain(camera):
                   camera.model.name.lower(), tuple(camera.k))
 
 
+def _note(text):
+    print(f"twoview: note: {text}", file=sys.stderr)
+
+
+def _parsed(text, name):
+    """camera_files.parse_cameras, whose warning becomes a line of the program's form."""
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always", camera_files.CameraFileWarning)
+        cameras = camera_files.parse_cameras(text, name)
+    for warning in said:
+        if issubclass(warning.category, camera_files.CameraFileWarning):
+            _note(warning.message)
+    return cameras
+
+
 def parse_camera(text, name):
     """Parses the text of a camera file; `name` is used in messages."""
-    return _plain(camera_files.only_camera(camera_files.parse_cameras(text, name), None, name))
+    return _plain(camera_files.only_camera(_parsed(text, name), None, name))
 
 
 def parse_cameras(text, name):
     """Parses the text of a camera file of any format as {name: Camera}."""
     return {entry: _plain(camera)
-            for entry, camera in camera_files.parse_cameras(text, name).items()}
+            for entry, camera in _parsed(text, name).items()}
 
 
 def read_camera(path):
@@ -184,8 +201,11 @@ def read_camera(path):
 
 def parse_camera_set(text, name):
     """Parses the text of a cameras.yaml as {entry: Camera}, in the order of the file."""
-    return {entry: _plain(camera) for entry, camera in camera_files.camera_set_of(
-        camera_files.parse_yaml(text, name), name).items()}
+    left_out = []
+    cameras = camera_files.camera_set_of(camera_files.parse_yaml(text, name), name, left_out)
+    if left_out:
+        _note(f"{name}: left out: {', '.join(left_out)}")
+    return {entry: _plain(camera) for entry, camera in cameras.items()}
 
 
 def read_camera_set(path):

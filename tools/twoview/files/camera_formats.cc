@@ -322,7 +322,8 @@ bool read_svo(CameraFile& file) {
     const std::string where = file.path + ": cameras[" + std::to_string(i) + "]";
     const YAML::Node item = list[i];
     const YAML::Node inner = item.IsMap() && item["camera"] ? item["camera"] : item;
-    if (!is_camera(inner)) throw BadInput(where + " is no camera with intrinsics");
+    if (!is_camera(inner))
+      throw BadInput(where + " is no camera with intrinsics (OKVIS's are not read); " + kWriteOurs);
     const bool has_label = inner["label"] && inner["label"].IsScalar();
     const std::string name = has_label ? inner["label"].Scalar() : "cam" + std::to_string(i);
     for (const auto& other : file.cameras)
@@ -397,6 +398,8 @@ void refuse_text_by_name(const std::string& text, const std::string& path) {
     throw BadInput(path +
                    ": ROS's INI (oST); convert it: rosrun camera_calibration_parsers convert "
                    "camera.ini camera.yaml");
+  if (!first.empty() && std::regex_match(first[0], std::regex("\\[[A-Z0-9_]+\\]")))
+    throw BadInput(path + ": an INI file, as ZED's cameras have; " + kWriteOurs);
   if (text.rfind("Pix4D", 0) == 0) throw BadInput(path + ": Pix4D's camera; " + kWriteOurs);
   static const std::set<std::string> dso = {"Pinhole",     "RadTan", "FOV",
                                             "EquiDistant", "ATAN",   "KannalaBrandt"};
