@@ -316,7 +316,8 @@ bool read_nerfstudio(CameraFile& file) {
 
 // SVO's and maplab's calibration: a list `cameras` of maps `camera`.
 bool read_svo(CameraFile& file) {
-  const YAML::Node& list = file.root["cameras"];
+  const YAML::Node& root = file.root;
+  const YAML::Node list = root["cameras"];
   if (!list || !list.IsSequence()) return false;
   for (size_t i = 0; i < list.size(); ++i) {
     const std::string where = file.path + ": cameras[" + std::to_string(i) + "]";
@@ -331,7 +332,7 @@ bool read_svo(CameraFile& file) {
     add_camera(file, name, {inner, where});
   }
   YAML::Node rest(YAML::NodeType::Map);
-  for (const auto& item : file.root)
+  for (const auto& item : root)
     if (key_of(item.first) != "cameras") rest[key_of(item.first)] = item.second;
   judge_rest(file, {rest, file.path});
   return list.size() > 0;

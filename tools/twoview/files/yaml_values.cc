@@ -22,13 +22,21 @@ double finite(const YAML::Node& node, const std::string& entry, const std::strin
   return value;
 }
 
-// Refuses two things that YAML::Load accepts: a name that occurs twice in a map (it would take the
-// first), and aliases, with which a small file can expand to an unlimited number of values.
+// Refuses three things that YAML::Load accepts: a name that occurs twice in a map (it would take
+// the first), aliases, with which a small file can expand to an unlimited number of values, and a
+// line that is all name, such as `dist_coeffs:[0.1, 0.2]` without a blank behind the colon.
 class StrictReader : public YAML::EventHandler {
  public:
   void OnDocumentStart(const YAML::Mark&) override {}
   void OnDocumentEnd() override {}
-  void OnNull(const YAML::Mark& mark, YAML::anchor_t) override { value(mark, "~"); }
+  void OnNull(const YAML::Mark& mark, YAML::anchor_t) override {
+    // Of a name without a colon yaml-cpp gives the null that it makes the name's own place.
+    const bool is_value =
+        !levels_.empty() && levels_.back().is_block && !levels_.back().name_is_next;
+    if (is_value && mark.pos == levels_.back().name_mark.pos)
+      refuse(mark, "no name and value (name: value)");
+    value(mark, "~");
+  }
   void OnAlias(const YAML::Mark& mark, YAML::anchor_t) override {
     refuse(mark, "aliases are not supported");
   }
@@ -43,15 +51,16 @@ class StrictReader : public YAML::EventHandler {
   }
   void OnSequenceEnd() override { levels_.pop_back(); }
   void OnMapStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
-                  YAML::EmitterStyle::value) override {
+                  YAML::EmitterStyle::value style) override {
     value(mark, "");
-    levels_.push_back({true, true, {}});
+    levels_.push_back({true, true, style != YAML::EmitterStyle::Flow, {}, {}});
   }
   void OnMapEnd() override { levels_.pop_back(); }
 
  private:
   struct Level {
-    bool is_map = false, name_is_next = false;
+    bool is_map = false, name_is_next = false, is_block = false;
+    YAML::Mark name_mark;
     std::set<std::string> names;
   };
 
@@ -62,6 +71,7 @@ class StrictReader : public YAML::EventHandler {
     Level& level = levels_.back();
     if (level.name_is_next && !level.names.insert(text).second)
       refuse(mark, text + " is given twice");
+    if (level.name_is_next) level.name_mark = mark;
     level.name_is_next = !level.name_is_next;
   }
   [[noreturn]] static void refuse(const YAML::Mark& mark, const std::string& why) {
@@ -158,12 +168,11 @@ std::vector<double> shape_of(const YAML::Node& value, const std::string& entry,
   std::vector<double> shape;
   if (!value.IsMap()) return shape;
   if (value["sizes"]) {
-    YAML::Node sizes = value["sizes"];
-    if (!sizes.IsSequence()) {
-      sizes = YAML::Node(YAML::NodeType::Sequence);
-      sizes.push_back(value["sizes"]);
-    }
-    append(sizes, entry + ".sizes", file, shape);
+    const YAML::Node sizes = value["sizes"];
+    if (sizes.IsSequence())
+      append(sizes, entry + ".sizes", file, shape);
+    else
+      shape.push_back(finite(sizes, entry + ".sizes", file));
   } else if (value["rows"] && value["cols"]) {
     for (const char* side : {"rows", "cols"})
       shape.push_back(number_at(value, side, file + ": " + entry));
