@@ -89,7 +89,9 @@ def test_a_plain_wall_is_inferred_from_its_edges():
         assert known.sum() > 0.8 * middle.sum() and not (known & ~middle).any()
         assert np.abs(inferred - wall())[known].max() < 0.005 and (its_sigma[known] > 0).all()
         assert not room.infer(planes[:0], *seen)[0].any()
-        room.add(*seen[:3], inferred, its_sigma, pixels=pixels, inferred=True)
+        for x in (0.0, 0.01):  # two maps have to agree
+            room.add(CAMERA, np.eye(3), [x, 0.0, 0.0], inferred, its_sigma, pixels=pixels,
+                     inferred=True)
         room.see_through(*seen)
         vertices = room.mesh().vertices
         assert 0.3 < vertices["inferred"].mean() < 0.7

@@ -331,7 +331,8 @@ class tv_room_mesh_options(Structure):
 
 class tv_room_plane(Structure):
     _fields_ = [("normal", c_double * 3), ("offset", c_double), ("centre", c_double * 3),
-                ("area", c_double), ("sigma", c_double), ("kind", c_int32), ("reserved", c_int32)]
+                ("area", c_double), ("sigma", c_double), ("share_behind", c_double),
+                ("kind", c_int32), ("reserved", c_int32)]
 
 
 class tv_room_plane_options(Structure):

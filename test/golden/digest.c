@@ -56,7 +56,7 @@ LAYOUT(tv_room_state, 72, max, 48);
 LAYOUT(tv_room_vertex, 40, reserved, 36);
 LAYOUT(tv_room_triangle, 12, idx_vertex, 0);
 LAYOUT(tv_room_mesh_options, 64, max, 40);
-LAYOUT(tv_room_plane, 80, reserved, 76);
+LAYOUT(tv_room_plane, 88, reserved, 84);
 LAYOUT(tv_room_plane_options, 48, gravity_sigma_rad, 40);
 LAYOUT(tv_room_infer_options, 8, max_step, 4);
 
@@ -739,7 +739,7 @@ static void digest_dense(const pair *p, tv_context *context, const matched *m,
 enum { ROOM_SIDE = 160, ROOM_PIXELS = ROOM_SIDE * ROOM_SIDE };
 
 /* What the pair's camera, reduced, sees in a box from a place within, turned by a quarter around
-   its y axis `turns` times: plain walls with a pattern and distances along their edges alone. */
+   its y axis `turns` times, as a chessboard of 24 pixels: distances and texture, or neither. */
 typedef struct box_view {
   tv_depth_map map;
   double R[9], t[3];
@@ -748,10 +748,10 @@ typedef struct box_view {
 } box_view;
 
 static void see_box(const tv_camera *camera, int turns, box_view *v) {
-  static const double low[3] = {-1.51, -1.02, -1.27}, high[3] = {1.49, 1.03, 1.63};
+  static const double low[3] = {-0.71, -0.52, -0.77}, high[3] = {0.69, 0.53, 0.83};
   static const double cosines[4] = {1, 0, -1, 0}, sines[4] = {0, 1, 0, -1};
   const double R[9] = {cosines[turns], 0, sines[turns], 0, 1, 0, -sines[turns], 0, cosines[turns]};
-  const double t[3] = {0.1 * turns - 0.15, 0.05 * turns, 0.07};
+  const double t[3] = {0.06 * turns - 0.09, 0.03 * turns, 0.07};
   int32_t k;
   memcpy(v->R, R, sizeof R);
   memcpy(v->t, t, sizeof t);
@@ -764,7 +764,8 @@ static void see_box(const tv_camera *camera, int turns, box_view *v) {
   v->map.channels = 1;
   for (k = 0; k < camera->width * camera->height; ++k) {
     const double pixel[2] = {k % camera->width, k / camera->width};
-    double ray[3], nearest = 1e9, inner = 1e9;
+    const int textured = (k % camera->width / 24 + k / camera->width / 24) % 2;
+    double ray[3], nearest = 1e9;
     int i, wall = 0;
     v->distance[k] = 0;
     v->pixels[k] = 0;
@@ -774,14 +775,8 @@ static void see_box(const tv_camera *camera, int turns, box_view *v) {
       const double to = d == 0 ? 1e9 : ((d > 0 ? high[i] : low[i]) - t[i]) / d;
       if (to < nearest) nearest = to, wall = i;
     }
-    for (i = 0; i < 3; ++i) {
-      const double d = (R[3 * i] * ray[0] + R[3 * i + 1] * ray[1]) + R[3 * i + 2] * ray[2];
-      const double at = t[i] + nearest * d;
-      if (i != wall && at - low[i] < inner) inner = at - low[i];
-      if (i != wall && high[i] - at < inner) inner = high[i] - at;
-    }
-    v->pixels[k] = (uint8_t)(inner < 0.3 ? (k * 37 + k / 7 * 11) % 256 : 150 + 20 * wall);
-    if (inner < 0.3) v->distance[k] = (float)nearest;
+    v->pixels[k] = (uint8_t)(textured ? (k * 37 + k / 7 * 11) % 256 : 150 + 20 * wall);
+    if (textured) v->distance[k] = (float)nearest;
   }
 }
 
@@ -815,6 +810,7 @@ static void digest_room(const pair *p, tv_context *context) {
   must("room_remove", tv_room_remove(room, &camera, views[1].R, views[1].t, &views[1].map));
   tv_room_plane_options_init(&options);
   options.gravity[1] = 1;
+  options.min_area = 0.05;
   must("room_planes", tv_room_find_planes(room, &options, planes, 8, &num));
   add_int(num);
   add_bytes(planes, (size_t)num * sizeof *planes);

@@ -534,12 +534,49 @@ void test_plain_walls_are_found_by_their_edges_and_inferred_between() {
   for (const tv_room_vertex& v : vertices) TEST_ASSERT_EQUAL(0, v.inferred);
 }
 
+// A wall with an opening into another room: nothing is carried across it, although its middle is
+// plain and the wall borders on it, because farther things were measured around its middle.
+void test_a_plane_is_not_carried_where_farther_things_were_measured() {
+  const tv_camera camera = box_room::pinhole(160, 120, 110);
+  const Vec3 from(0, 0, 0);
+  Scene wall, other;
+  wall.normal = other.normal = Vec3(0, 1, 0);
+  wall.offset = 2, other.offset = 3;
+  Map m = box_room::see(wall, camera, from, Vec3(0, 1, 0), 0.02f);
+  const Map behind = box_room::see(other, camera, from, Vec3(0, 1, 0), 0.02f);
+  for (size_t y = 0; y < 120; ++y) {
+    for (size_t x = 0; x < 160; ++x) {
+      const size_t k = y * 160 + x;
+      const bool left = x < 50, frame = y < 12 || y >= 108;
+      const int grey = left || frame ? static_cast<int>((x * 71 ^ y * 37) % 200) : 150;
+      for (size_t c = 0; c < 3; ++c) m.pixels[3 * k + c] = static_cast<uint8_t>(grey);
+      if (!left && frame) m.distance[k] = behind.distance[k];  // all around the door
+      if (!left && !frame) m.distance[k] = 0;
+    }
+  }
+  box_room::aim(&m);
+  tv_room* room = new_room();
+  TEST_ASSERT_EQUAL(TV_OK, add(room, m));
+  Planes planes = find_planes(room, false);
+  TEST_ASSERT_TRUE(planes.num >= 1);
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, -2, planes.planes[0].offset);
+  TEST_ASSERT_TRUE(planes.planes[0].share_behind > 0.1);
+  int32_t num;
+  planes.num = 1;
+  infer(room, m, planes, &num);
+  TEST_ASSERT_EQUAL(0, num);
+}
+
 void test_an_inferred_wall_that_a_map_sees_through_vanishes() {
   tv_room* room = new_room();
   Map inferred = wall_at(1, Vec3(0, 0, 0), 0.02f);
   inferred.map.inferred = 1;
   const Map measured = wall_at(2, Vec3(0, 0, 0), 0.02f);
   TEST_ASSERT_EQUAL(TV_OK, add(room, measured));
+  TEST_ASSERT_EQUAL(TV_OK, add(room, inferred));
+  mesh(room);
+  TEST_ASSERT_EQUAL(0, vertices_near(1));  // one map alone infers nothing
+  inferred.t[0] = 0.05;
   TEST_ASSERT_EQUAL(TV_OK, add(room, inferred));
   mesh(room);
   TEST_ASSERT_TRUE(vertices_near(1) > 500);
@@ -564,6 +601,7 @@ int main(void) {
   RUN_TEST(test_distances_that_are_none_are_unknown);
   RUN_TEST(test_small_pieces_are_left_out);
   RUN_TEST(test_plain_walls_are_found_by_their_edges_and_inferred_between);
+  RUN_TEST(test_a_plane_is_not_carried_where_farther_things_were_measured);
   RUN_TEST(test_an_inferred_wall_that_a_map_sees_through_vanishes);
   return UNITY_END();
 }

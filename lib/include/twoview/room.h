@@ -83,7 +83,7 @@ typedef struct tv_depth_map {
   /* 1 (grey) or 3 (red, green, blue); not read without pixels. */
   int32_t channels;
   /* 1: no view measured these distances, they were inferred (tv_room_infer). They make surface only
-     where nothing was measured, and its vertices say so. Else 0. */
+     where nothing was measured and two maps or more agree, and its vertices say so. Else 0. */
   int32_t inferred;
 } tv_depth_map;
 
@@ -257,6 +257,9 @@ typedef struct tv_room_plane {
   double area;
   /* The root mean square of the distances of its blocks' surfaces from it. */
   double sigma;
+  /* Which share of the measured surface lies behind it by more than four voxels, [0, 1]: next to
+     nothing for a wall of the room, and more for a table or a cupboard. */
+  double share_behind;
   /* A tv_room_plane_kind. */
   int32_t kind;
   /* Always 0. */
@@ -321,8 +324,9 @@ TV_API tv_status tv_room_infer_size(int32_t width, int32_t height, size_t *size_
 
 /* Carries planes across what has no texture: the distances that a map lacks, of pixels in a region
    of its picture without texture, at whose edge or in which enough was measured on a plane, and
-   little elsewhere. Where several planes qualify, the nearest along the ray is seen. Where the room
-   has a measured surface, or a map saw through there, nothing is inferred.
+   nothing farther away. Where several planes qualify, the nearest along the ray is seen. Where the
+   room has a measured surface, where a map saw through, and beyond a plane of a share_behind below
+   0.03, nothing is inferred.
    room, camera, R, t, map: as for tv_room_add; the map needs `pixels` and was measured
    (TV_ERR_ARGUMENT). planes: num_planes of tv_room_find_planes.
    options: null means the defaults. memory: starts at a multiple of TV_CONTEXT_ALIGNMENT and has at

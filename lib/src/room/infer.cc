@@ -17,8 +17,12 @@ constexpr double kLeastShare = 0.1;
 // How far from the region, in pixels, what its edge shows may be measured: texture begins where the
 // smoothed picture has its edge, and a depth map rarely reaches to there.
 constexpr int32_t kEdgeReach = 6;
+// For each pixel that was measured on the plane, the most that were measured beyond it.
+constexpr double kMostBeyond = 0.15;
 // The most of the region's measured pixels that may lie on none of the planes carried into it.
 constexpr double kMostOff = 0.3;
+// A plane is a wall of the room where a smaller share of the measured surface lies behind it.
+constexpr double kMostBehindWall = 0.03;
 // The least cosine between the ray and the plane's normal: 80 degrees.
 constexpr double kLeastCosine = 0.17;
 
@@ -90,19 +94,47 @@ double distance_to(const tv_room_plane& plane, const RoomView& view, const Sight
   return distance > 0 ? distance : 0;
 }
 
-// The plane that a measured pixel lies on, -1 for none, -2 where nothing was measured.
-int32_t plane_at(const tv_room& room, const RoomView& view, const InferRequest& request,
-                 int32_t at) {
+// Whether one of the room's own walls, behind which next to nothing was measured, is nearer on this
+// ray.
+bool is_beyond_a_wall(const RoomView& view, const InferRequest& request, const Sight& sight,
+                      double distance) {
+  for (int32_t p = 0; p < request.num_planes; ++p) {
+    const tv_room_plane& plane = request.planes[p];
+    if (plane.share_behind >= kMostBehindWall || !(dot(plane.normal, sight.ray) < 0)) continue;
+    const double at[3] = {view.centre[0] + distance * sight.ray[0],
+                          view.centre[1] + distance * sight.ray[1],
+                          view.centre[2] + distance * sight.ray[2]};
+    if (dot(plane.normal, at) < plane.offset - 3 * plane.sigma) return true;
+  }
+  return false;
+}
+
+struct Votes {
+  int32_t on[TV_ROOM_MAX_PLANES];      // measured on the plane, in the region or along its edge
+  int32_t beyond[TV_ROOM_MAX_PLANES];  // measured farther than the plane, there
+  int32_t measured, off;               // in the region: measured, and on no plane
+  int32_t edge;                        // pixels along its edge
+};
+
+// Counts a measured pixel. Returns the plane that it lies on, kOnNone, or kNotMeasured.
+constexpr int32_t kOnNone = -1, kNotMeasured = -2;
+
+int32_t vote(const tv_room& room, const RoomView& view, const InferRequest& request, int32_t at,
+             Votes* votes) {
   const Measured m = measured_at(room, view, at % view.map.width, at / view.map.width);
   Sight sight;
-  if (m.weight == 0 || !sight_at(view, at, &sight)) return -2;
-  int32_t best = -1;
-  double least = kNearSigmas * m.sigma + room.options.voxel;
+  if (m.weight == 0 || !sight_at(view, at, &sight)) return kNotMeasured;
+  const double most = kNearSigmas * m.sigma + room.options.voxel;
+  int32_t best = kOnNone;
+  double least = most;
   for (int32_t p = 0; p < request.num_planes; ++p) {
     const double distance = distance_to(request.planes[p], view, sight);
+    if (!(distance > 0)) continue;
     const double off = std::fabs(distance - m.distance);
-    if (distance > 0 && off < least) least = off, best = p;
+    if (off < least) least = off, best = p;
+    votes->beyond[p] += m.distance - distance > most;
   }
+  if (best >= 0) ++votes->on[best];
   return best;
 }
 
@@ -124,21 +156,22 @@ bool is_measured(const tv_room& room, const double point[3]) {
   return voxels_of(room, block)[v].evidence != 0;
 }
 
-struct Votes {
-  int32_t on[TV_ROOM_MAX_PLANES];  // in the region or along its edge
-  int32_t measured, off;           // in the region: measured, and on no plane
-  int32_t edge;                    // pixels along its edge
-};
-
-// The plane of what was measured first on the way from a pixel outwards; below 0 without one.
-int32_t plane_beyond(const tv_room& room, const RoomView& view, const InferRequest& request,
-                     int32_t x, int32_t y, int32_t dx, int32_t dy) {
+// Counts what was measured first on the way from a pixel outwards.
+void vote_beyond(const tv_room& room, const RoomView& view, const InferRequest& request, int32_t x,
+                 int32_t y, int32_t dx, int32_t dy, Votes* votes) {
   for (int32_t k = 0; k < kEdgeReach; ++k, x += dx, y += dy) {
     if (x < 0 || y < 0 || x >= view.map.width || y >= view.map.height) break;
-    const int32_t plane = plane_at(room, view, request, y * view.map.width + x);
-    if (plane > -2) return plane;
+    if (vote(room, view, request, y * view.map.width + x, votes) != kNotMeasured) break;
   }
-  return -2;
+}
+
+// Whether the region may be a part of the plane. What was measured on it speaks for it, and what
+// was measured farther away against it, because that was seen through it; what is nearer may stand
+// before it.
+bool may_be_of(const Votes& votes, int32_t plane) {
+  const int32_t on = votes.on[plane];
+  return on >= kLeastVotes && on >= kLeastShare * votes.edge &&
+         votes.beyond[plane] <= kMostBeyond * on;
 }
 
 // Collects the region of plain pixels around a pixel, and what was measured in it and at its edge.
@@ -158,9 +191,8 @@ int32_t grow(const tv_room& room, const RoomView& view, const InferRequest& requ
         picture.state[n] = kTaken;
         picture.region[size++] = n;
       } else if (picture.state[n] == kTextured) {
-        const int32_t plane = plane_beyond(room, view, request, x + dx, y + dy, dx, dy);
+        vote_beyond(room, view, request, x + dx, y + dy, dx, dy, votes);
         ++votes->edge;
-        if (plane >= 0) ++votes->on[plane];
       }
     }
   }
@@ -190,10 +222,9 @@ int32_t infer_distances(const tv_room& room, const RoomView& view, const InferRe
     Votes votes = {};
     const int32_t size = grow(room, view, request, picture, from, &votes);
     for (int32_t k = 0; k < size; ++k) {
-      const int32_t plane = plane_at(room, view, request, picture.region[k]);
-      votes.measured += plane > -2;
-      votes.off += plane == -1;
-      if (plane >= 0) ++votes.on[plane];
+      const int32_t plane = vote(room, view, request, picture.region[k], &votes);
+      votes.measured += plane != kNotMeasured;
+      votes.off += plane == kOnNone;
     }
     if (votes.off > kMostOff * votes.measured) continue;
     for (int32_t k = 0; k < size; ++k) {
@@ -207,11 +238,11 @@ int32_t infer_distances(const tv_room& room, const RoomView& view, const InferRe
       double nearest = 0;
       const tv_room_plane* seen = nullptr;
       for (int32_t p = 0; p < request.num_planes; ++p) {
-        if (votes.on[p] < kLeastVotes || votes.on[p] < kLeastShare * votes.edge) continue;
+        if (!may_be_of(votes, p)) continue;
         const double d = distance_to(request.planes[p], view, sight);
         if (d > 0 && (seen == nullptr || d < nearest)) nearest = d, seen = &request.planes[p];
       }
-      if (seen == nullptr) continue;
+      if (seen == nullptr || is_beyond_a_wall(view, request, sight, nearest)) continue;
       double point[3];
       for (int i = 0; i < 3; ++i) point[i] = view.centre[i] + nearest * sight.ray[i];
       if (is_measured(room, point)) continue;

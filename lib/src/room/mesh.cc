@@ -12,6 +12,7 @@ constexpr int32_t kGridStep[3] = {1, kGrid, kGrid* kGrid};
 constexpr int32_t kFreeWeight = 8;
 // What was inferred counts where more than four maps inferred it for each that sees through it.
 constexpr int32_t kMostThroughInferred = 4;
+constexpr int32_t kLeastInferred = 2;
 // The least length of the mean of a block's normals.
 constexpr float kLeastCoherence = 0.8f;
 // The largest difference of two neighbours between which the surface passes. Without noise it is
@@ -30,7 +31,8 @@ struct Sample {
 
 Sample sample_of(const Voxel* voxel, bool inferred, int32_t min_maps) {
   const uint64_t e = voxel->evidence;
-  const bool known = inferred ? surface_count(e) > kMostThroughInferred * free_count(e)
+  const bool known = inferred ? surface_count(e) > kMostThroughInferred * free_count(e) &&
+                                    surface_count(e) >= kLeastInferred
                               : surface_count(e) >= min_maps;
   if (!known) return {0, false, inferred, voxel};
   const int32_t weight = weight_sum(e);

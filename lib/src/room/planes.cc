@@ -12,6 +12,8 @@ namespace {
 // within a voxel and a half, or three of its standard deviations.
 constexpr double kLikeNormal = 0.94;
 constexpr double kNearVoxels = 1.5, kNearSigmas = 3;
+// What is farther behind a plane than this is not a part of it.
+constexpr double kBehindVoxels = 4;
 // How many candidates a plane is chosen of, and over how many blocks they are compared.
 constexpr int32_t kCandidates = 256, kCompared = 4096;
 constexpr int kRefits = 4;
@@ -191,6 +193,18 @@ int32_t kind_of(const PlaneRequest& request, const double normal[3]) {
   return along > kLevelCosine ? TV_ROOM_PLANE_LEVEL : TV_ROOM_PLANE_OTHER;
 }
 
+// Which share of the measured surface lies behind the plane.
+double share_behind(const tv_room& room, const Plane& plane) {
+  double all = 0, behind = 0;
+  for (int32_t k = 0; k < room.end_blocks; ++k) {
+    const Surfel& s = room.surfels[k];
+    const double area = static_cast<double>(s.area);
+    all += area;
+    if (distance_from(plane, s) < -kBehindVoxels * room.options.voxel) behind += area;
+  }
+  return behind / all;
+}
+
 }  // namespace
 
 int32_t find_planes(tv_room& room, const PlaneRequest& request, tv_room_plane* planes,
@@ -220,6 +234,7 @@ int32_t find_planes(tv_room& room, const PlaneRequest& request, tv_room_plane* p
     out->offset = plane.offset;
     out->area = area;
     out->sigma = std::sqrt(fit.spread);
+    out->share_behind = share_behind(room, plane);
     out->kind = kind_of(request, plane.normal);
   }
   return num;
