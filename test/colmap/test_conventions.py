@@ -54,8 +54,13 @@ def test_a_camera_comes_back(model):
 @pytest.mark.parametrize("model, params", [
     ("SIMPLE_PINHOLE", (500, 320, 240)), ("SIMPLE_RADIAL", (500, 320, 240, -0.1)),
     ("RADIAL", (500, 320, 240, -0.1, 0.02)), ("RADIAL_FISHEYE", (300, 320, 240, 0.01, 0.002)),
-    ("SIMPLE_RADIAL_FISHEYE", (300, 320, 240, 0.01))])
-def test_colmaps_simpler_cameras_are_read(model, params):
+    ("SIMPLE_RADIAL_FISHEYE", (300, 320, 240, 0.01)), ("SIMPLE_FISHEYE", (300, 320, 240)),
+    ("FISHEYE", (300, 310, 320, 240)), ("DIVISION", (500, 510, 320, 240, 0)),
+    ("THIN_PRISM_FISHEYE", (300, 310, 320, 240, 0.01, 0.002, 0, 0, 1e-3, -2e-4, 0, 0)),
+    ("RAD_TAN_THIN_PRISM_FISHEYE", (300, 310, 320, 240, 0.01, 0.002, 1e-3, -2e-4, *[0] * 8))])
+def test_colmaps_other_cameras_are_read(model, params):
+    if not hasattr(pycolmap.CameraModelId, model):
+        pytest.skip(f"this pycolmap has no {model}")
     row = conventions.ColmapCamera(model, WIDTH, HEIGHT, params)
     pixels = np.random.default_rng(1).uniform((40, 40), (600, 440), (50, 2))
     rays, _ = tv.camera_unproject_points(conventions.camera_from_colmap(row, "x"), pixels)
@@ -68,6 +73,13 @@ def test_other_lenses_are_named():
         conventions.camera_from_colmap(
             conventions.ColmapCamera("FOV", 9, 9, (1, 1, 1, 1, 1)), "a.jpg"
         )
+
+
+def test_the_numbers_of_models_are_colmaps():
+    theirs = {name: int(value) for name, value in pycolmap.CameraModelId.__members__.items()}
+    assert len(theirs) > 9
+    for name, number in conventions.MODEL_IDS.items():
+        assert theirs.get(name, number) == number
 
 
 def test_keypoints_have_six_columns_with_colmaps_scale_and_angle():
