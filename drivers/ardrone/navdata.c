@@ -187,7 +187,8 @@ static void take_motion(const ardrone_navdata *navdata, tvs_imu *sample) {
   const float *v = demo->velocity_mm_s;
   if ((navdata->state & ARDRONE_STATE_FLYING) == 0)
     return; /* on the ground the drone reports velocity and altitude without measuring them */
-  if (demo->altitude_mm > 0 && demo->altitude_mm < 200000) {
+  if (demo->altitude_mm > 0 && demo->altitude_mm < 200000 &&
+      (navdata->state & ARDRONE_STATE_ULTRASOUND_DEAF) == 0) {
     sample->altitude_m = demo->altitude_mm * 1e-3;
     sample->altitude_sigma = 0.02 + 0.01 * sample->altitude_m;
     sample->valid |= TVS_IMU_ALTITUDE;

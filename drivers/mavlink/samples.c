@@ -14,6 +14,11 @@ static const int64_t CHOICE_NS = 1 * SECOND; /* how long heights are listened to
 static const int64_t LATEST_REPLY_NS = 500 * MS;
 static const int64_t DRIFT_PPM = 100;
 static const double RATE_SIGMA = 0.01; /* rad/s */
+/* What no vehicle with a camera that looks at the ground has: such a reading is no measurement. */
+static const double MOST_HEIGHT_M = 3000, MOST_SPEED_M_S = 150;
+/* The least share of the vertical in the direction of a rangefinder: a beam that is 45 degrees off
+   it may meet a wall. */
+static const double LEAST_DOWN = 0.7;
 
 /* ---- the vehicle's clock ---- */
 
@@ -74,6 +79,7 @@ static void begin_run(tvm_session *s, const tvs_time *time, double yaw_rad) {
   s->velocity.num = 0;
   for (k = 0; k < NUM_HEIGHTS; ++k) s->heights[k].num = 0;
   s->height = NUM_HEIGHTS;
+  s->range_id = -1;
   tvs_attitudes_init(&s->attitudes);
 }
 
@@ -197,7 +203,7 @@ static void complete(const tvm_session *s, struct pending *p) {
   if ((sample->valid & TVS_IMU_ALTITUDE) == 0 && s->height < NUM_HEIGHTS &&
       value_at(&s->heights[s->height], sample->time.device_ns, HEIGHT_GAP_NS, value)) {
     sample->altitude_m = value[0];
-    sample->altitude_sigma = height_sigma(s->height, value[0]);
+    sample->altitude_sigma = value[1];
     sample->valid |= TVS_IMU_ALTITUDE;
   }
 }
@@ -242,8 +248,10 @@ static void take_attitude(tvm_session *s, const mavlink_message_t *m) {
   tvs_imu sample;
   struct pending *p;
   mavlink_msg_attitude_decode(m, &a);
-  if (!(fabs((double)a.roll) < 10 && fabs((double)a.pitch) < 10 && fabs((double)a.yaw) < 10))
-    return; /* NaN too */
+  if (!(fabs((double)a.roll) < 10 && fabs((double)a.pitch) < 10 && fabs((double)a.yaw) < 10)) {
+    ++s->num_invalid; /* NaN too */
+    return;
+  }
   memset(&sample, 0, sizeof sample);
   if (!time_of(s, a.time_boot_ms, &sample.time)) return;
   if (sample.time.clock_id != s->clock_id) begin_run(s, &sample.time, (double)a.yaw);
@@ -270,9 +278,14 @@ static void take_attitude(tvm_session *s, const mavlink_message_t *m) {
   tvs_quaternion_from_euler((double)a.yaw, (double)a.pitch, (double)a.roll, p->ned_from_body);
 }
 
-static void add_height(tvm_session *s, height_kind kind, int64_t device_ns, double height_m) {
-  const double value[3] = {height_m, 0, 0};
-  if (isfinite(height_m) && fabs(height_m) < 1e5) add_value(s, &s->heights[kind], device_ns, value);
+/* least_sigma_m: what the sensor itself says of its error; 0 where it says nothing. */
+static void add_height(tvm_session *s, height_kind kind, int64_t device_ns, double height_m,
+                       double least_sigma_m) {
+  const double value[3] = {height_m, fmax(height_sigma(kind, height_m), least_sigma_m), 0};
+  if (fabs(height_m) <= MOST_HEIGHT_M)
+    add_value(s, &s->heights[kind], device_ns, value);
+  else
+    ++s->num_invalid; /* NaN too */
 }
 
 static void take_position(tvm_session *s, const mavlink_message_t *m) {
@@ -280,10 +293,12 @@ static void take_position(tvm_session *s, const mavlink_message_t *m) {
   tvs_time time;
   mavlink_msg_local_position_ned_decode(m, &p);
   if (!time_of(s, p.time_boot_ms, &time) || time.clock_id != s->clock_id) return;
-  add_height(s, HEIGHT_LOCAL, time.device_ns, -(double)p.z);
-  if (fabs((double)p.vx) < 1e3 && fabs((double)p.vy) < 1e3 && fabs((double)p.vz) < 1e3) {
+  add_height(s, HEIGHT_LOCAL, time.device_ns, -(double)p.z, 0);
+  if (hypot(hypot((double)p.vx, (double)p.vy), (double)p.vz) <= MOST_SPEED_M_S) {
     const double velocity[3] = {(double)p.vx, (double)p.vy, (double)p.vz};
     add_value(s, &s->velocity, time.device_ns, velocity);
+  } else {
+    ++s->num_invalid; /* NaN too */
   }
 }
 
@@ -305,31 +320,68 @@ static void take_altitude(tvm_session *s, const mavlink_message_t *m) {
     const int64_t stamp_ns = (int64_t)a.time_usec * 1000;
     if (stamp_ns - device_ns < SECOND && device_ns - stamp_ns < SECOND) device_ns = stamp_ns;
   }
+  /* A clearance that is not known is NaN or below 0, and 0 on the ground: nothing is wrong with it.
+   */
   if ((double)a.bottom_clearance > 0)
-    add_height(s, HEIGHT_CLEARANCE, device_ns, (double)a.bottom_clearance);
-  add_height(s, HEIGHT_RELATIVE, device_ns, (double)a.altitude_relative);
+    add_height(s, HEIGHT_CLEARANCE, device_ns, (double)a.bottom_clearance, 0);
+  add_height(s, HEIGHT_RELATIVE, device_ns, (double)a.altitude_relative, 0);
+}
+
+/* Whether a DISTANCE_SENSOR looks down the body's z axis or, with an orientation of its own, in a
+   direction of the body's axes that its quaternion turns x to. False: it looks elsewhere. */
+static int direction_of(const mavlink_distance_sensor_t *d, double direction[3]) {
+  const double w = (double)d->quaternion[0], x = (double)d->quaternion[1],
+               y = (double)d->quaternion[2], z = (double)d->quaternion[3];
+  const double norm_sq = w * w + x * x + y * y + z * z;
+  direction[0] = direction[1] = 0;
+  direction[2] = 1;
+  if (d->orientation == MAV_SENSOR_ROTATION_PITCH_270) return 1;
+  if (d->orientation != MAV_SENSOR_ROTATION_CUSTOM || !(norm_sq > 0.5 && norm_sq < 2)) return 0;
+  direction[0] = (w * w + x * x - y * y - z * z) / norm_sq;
+  direction[1] = 2 * (x * y + w * z) / norm_sq;
+  direction[2] = 2 * (x * z - w * y) / norm_sq;
+  return direction[2] >= LEAST_DOWN;
+}
+
+/* Whether the sensor measured anything. Its quality is 1 for an invalid signal, 0 where it is not
+   known and else a percentage. At the ends of its range a sensor repeats them, whatever is there.
+ */
+static int is_reading(const mavlink_distance_sensor_t *d) {
+  return d->signal_quality != 1 && d->current_distance > 0 &&
+         d->current_distance > d->min_distance && d->current_distance < d->max_distance;
+}
+
+/* The vertical's share of a direction of the body's axes: the third row of the rotation times it.
+ */
+static double share_of_down(const double q[4], const double v[3]) {
+  const double w = q[0], x = q[1], y = q[2], z = q[3];
+  return 2 * (x * z - w * y) * v[0] + 2 * (y * z + w * x) * v[1] + (1 - 2 * (x * x + y * y)) * v[2];
 }
 
 static void take_distance(tvm_session *s, const mavlink_message_t *m) {
   mavlink_distance_sensor_t d;
   tvs_attitude attitude;
   tvs_time time;
-  double x, y;
+  double direction[3], down, sigma_m;
   mavlink_msg_distance_sensor_decode(m, &d);
-  if (d.orientation != MAV_SENSOR_ROTATION_PITCH_270 || d.current_distance < d.min_distance ||
-      d.current_distance > d.max_distance || d.current_distance == 0 ||
-      !time_of(s, d.time_boot_ms, &time) || time.clock_id != s->clock_id ||
-      s->attitudes.count == 0) {
+  if (!direction_of(&d, direction)) return;
+  if (!is_reading(&d)) {
+    ++s->num_invalid;
     return;
   }
-  /* The sensor measures along the body's z axis, whose share of the vertical is R33. */
+  if (!time_of(s, d.time_boot_ms, &time) || time.clock_id != s->clock_id || s->attitudes.count == 0)
+    return;
+  /* Two sensors differ by where they are mounted: a run keeps to the first one that measured. */
+  if (s->range_id < 0) s->range_id = d.id;
+  if (s->range_id != d.id) return;
   attitude =
       s->attitudes.entries[(s->attitudes.first + s->attitudes.count - 1) % TVS_ATTITUDES_CAPACITY]
           .attitude;
-  x = attitude.world_from_body[1];
-  y = attitude.world_from_body[2];
-  add_height(s, HEIGHT_RANGE, time.device_ns,
-             0.01 * d.current_distance * (1 - 2 * (x * x + y * y)));
+  down = share_of_down(attitude.world_from_body, direction);
+  if (down < LEAST_DOWN) return;
+  /* The variance in cm^2; 255: not known, and many sensors leave it 0. */
+  sigma_m = d.covariance < 255 ? 0.01 * sqrt((double)d.covariance) : 0;
+  add_height(s, HEIGHT_RANGE, time.device_ns, 0.01 * d.current_distance * down, sigma_m * down);
 }
 
 void tvm_take_message(tvm_session *s, const mavlink_message_t *m) {

@@ -61,6 +61,7 @@ tvs_status tvm_session_init(tvm_session **session, const tvm_session_options *op
   tvs_clock_init(&s->clock, &clock, 1, 1);
   tvs_attitudes_init(&s->attitudes);
   s->height = NUM_HEIGHTS;
+  s->range_id = -1;
   *session = s;
   return TVS_OK;
 }
@@ -115,6 +116,10 @@ tvm_autopilot tvm_session_autopilot(const tvm_session *session, int *system) {
 
 void tvm_session_counters(const tvm_session *session, tvm_counters *counters) {
   if (session && counters) *counters = session->counters;
+}
+
+uint64_t tvm_session_num_invalid(const tvm_session *session) {
+  return session ? session->num_invalid : 0;
 }
 
 static tvs_status next_imu(void *user, tvs_imu *sample) {

@@ -44,6 +44,7 @@ struct tvm_session {
   tvm_transport transport;
   int64_t now_ns;
   tvm_counters counters;
+  uint64_t num_invalid; /* readings */
 
   /* packets */
   mavlink_message_t parsed;
@@ -74,7 +75,8 @@ struct tvm_session {
   double yaw0_rad;
   int64_t first_device_ns;
   track velocity, heights[NUM_HEIGHTS];
-  int height; /* the height_kind that this run uses; NUM_HEIGHTS: not chosen yet */
+  int height;   /* the height_kind that this run uses; NUM_HEIGHTS: not chosen yet */
+  int range_id; /* of the DISTANCE_SENSOR that this run uses; -1: none was heard yet */
   struct pending {
     tvs_imu sample;
     double ned_from_body[4];

@@ -153,6 +153,8 @@ class Mavlink(unittest.TestCase):
         while at < len(data):
             size = 12 + data[at + 9]
             message = parser.decode(bytearray(data[at + 8:at + 8 + size]))
+            # MAVLink's tools (pymavlink's mavutil) read the number of the link there.
+            self.assertEqual(data[at + 7] & 3, 0)
             kinds[message.get_type()] = kinds.get(message.get_type(), 0) + 1
             at += 8 + size
         self.assertGreater(kinds["ATTITUDE"], 100)

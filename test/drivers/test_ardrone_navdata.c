@@ -269,6 +269,19 @@ static void test_garbage_is_not_valid(void) {
   TEST_ASSERT_EQUAL_INT(TVS_ERR_STRUCT_SIZE, ardrone_navdata_to_imu(&navdata, 0, &imu));
 }
 
+static void test_a_deaf_ultrasound_gives_no_altitude(void) {
+  memset(&navdata, 0, sizeof navdata);
+  navdata.present = 1u << 0;
+  navdata.demo.altitude_mm = 1234;
+  navdata.state = ARDRONE_STATE_FLYING;
+  convert(0);
+  TEST_ASSERT_TRUE(imu.valid & TVS_IMU_ALTITUDE);
+  navdata.state |= ARDRONE_STATE_ULTRASOUND_DEAF;
+  convert(0);
+  TEST_ASSERT_FALSE(imu.valid & TVS_IMU_ALTITUDE);
+  TEST_ASSERT_TRUE(imu.valid & TVS_IMU_VELOCITY_XY);
+}
+
 static void test_on_the_ground_velocity_and_altitude_are_unknown(void) {
   navdata.present = 1u << 0;
   navdata.demo.altitude_mm = 243;
@@ -298,6 +311,7 @@ int main(void) {
   RUN_TEST(test_units_frames_and_signs);
   RUN_TEST(test_vertical_velocity_is_turned_into_the_body);
   RUN_TEST(test_garbage_is_not_valid);
+  RUN_TEST(test_a_deaf_ultrasound_gives_no_altitude);
   RUN_TEST(test_on_the_ground_velocity_and_altitude_are_unknown);
   RUN_TEST(test_time_wraps_at_2048_seconds);
   return UNITY_END();

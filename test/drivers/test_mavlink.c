@@ -329,6 +329,132 @@ static void test_the_link_tells_silence_and_asks_again(void) {
   TEST_ASSERT_EQUAL_INT(4, requests);
 }
 
+static mavlink_distance_sensor_t looking_down(uint8_t quality) {
+  mavlink_distance_sensor_t d;
+  memset(&d, 0, sizeof d);
+  d.min_distance = 20;
+  d.max_distance = 1200;
+  d.current_distance = 300;
+  d.orientation = MAV_SENSOR_ROTATION_PITCH_270;
+  d.signal_quality = quality;
+  return d;
+}
+
+/* Flies level for 2.5 s at 1.5 m by the local position, with `d` at 10 Hz. Returns the last sample
+   that has a height. */
+static tvs_imu fly_with(mavlink_distance_sensor_t d, double roll) {
+  mavlink_message_t m;
+  int k;
+  begin();
+  attitude(5000, roll, 0, 0);
+  for (k = 1; k <= 25; ++k) {
+    attitude((uint32_t)(5000 + 100 * k), roll, 0, 0);
+    position((uint32_t)(5001 + 100 * k), -1.5, 0.2, 0, 0);
+    d.time_boot_ms = (uint32_t)(5002 + 100 * k);
+    mavlink_msg_distance_sensor_encode_status(SYSTEM, 1, &sender, &m, &d);
+    add(&m);
+    step((1100 + 100 * k) * MS);
+  }
+  step(4500 * MS);
+  for (k = num_imu - 1; k > 0 && !(samples[k].valid & TVS_IMU_ALTITUDE);) --k;
+  TEST_ASSERT_TRUE(samples[k].valid & TVS_IMU_ALTITUDE);
+  return samples[k];
+}
+
+static void test_a_distance_without_a_signal_is_no_height(void) {
+  mavlink_distance_sensor_t d = looking_down(0);
+  int k;
+  TEST_ASSERT_DOUBLE_WITHIN(1e-5, 3.0, fly_with(d, 0).altitude_m); /* 0: the quality is not known */
+  TEST_ASSERT_EQUAL_UINT64(0, tvm_session_num_invalid(session));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-5, 3.0, fly_with(looking_down(100), 0).altitude_m);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-5, 1.5, fly_with(looking_down(1), 0).altitude_m);
+  TEST_ASSERT_EQUAL_UINT64(25, tvm_session_num_invalid(session));
+  for (k = 0; k < 5; ++k) { /* at and beyond the ends of its range, and nothing at all */
+    static const uint16_t distances[5] = {20, 10, 1200, 1300, 0};
+    d.current_distance = distances[k];
+    if (distances[k] == 0) d.min_distance = 0;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-5, 1.5, fly_with(d, 0).altitude_m);
+    TEST_ASSERT_EQUAL_UINT64(25, tvm_session_num_invalid(session));
+  }
+  d = looking_down(100);
+  d.orientation = MAV_SENSOR_ROTATION_NONE; /* forward */
+  TEST_ASSERT_DOUBLE_WITHIN(1e-5, 1.5, fly_with(d, 0).altitude_m);
+  TEST_ASSERT_EQUAL_UINT64(0, tvm_session_num_invalid(session));
+}
+
+/* The sensor's own variance, where it states one; the tilt of the vehicle and of the sensor. */
+static void test_a_distance_has_its_direction_and_its_error(void) {
+  mavlink_distance_sensor_t d = looking_down(100);
+  const double half = 0.5 * (1.5707963267948966 - 0.3); /* down is 90 degrees about y */
+  tvs_imu sample;
+  d.covariance = 255;
+  TEST_ASSERT_DOUBLE_WITHIN(1e-5, 0.08, fly_with(d, 0).altitude_sigma);
+  d.covariance = 225; /* cm^2 */
+  TEST_ASSERT_DOUBLE_WITHIN(1e-5, 0.15, fly_with(d, 0).altitude_sigma);
+  d.covariance = 0;
+  TEST_ASSERT_DOUBLE_WITHIN(1e-5, 3 * cos(0.4), fly_with(d, 0.4).altitude_m);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-5, 1.5, fly_with(d, 0.9).altitude_m); /* it may see a wall */
+  d.orientation = MAV_SENSOR_ROTATION_CUSTOM;
+  d.quaternion[0] =
+      (float)cos(half); /* x is turned by -90 + 17 degrees about y: forward and down */
+  d.quaternion[2] = (float)-sin(half);
+  sample = fly_with(d, 0);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-5, 3 * cos(0.3), sample.altitude_m);
+  d.quaternion[2] = (float)sin(half); /* up */
+  TEST_ASSERT_DOUBLE_WITHIN(1e-5, 1.5, fly_with(d, 0).altitude_m);
+  memset(d.quaternion, 0, sizeof d.quaternion); /* not known */
+  TEST_ASSERT_DOUBLE_WITHIN(1e-5, 1.5, fly_with(d, 0).altitude_m);
+}
+
+/* A run keeps to one sensor, as it keeps to one kind of height. */
+static void test_of_two_distances_one_is_used(void) {
+  mavlink_distance_sensor_t d = looking_down(100);
+  mavlink_message_t m;
+  int k;
+  begin();
+  attitude(5000, 0, 0, 0);
+  for (k = 1; k <= 50; ++k) {
+    attitude((uint32_t)(5000 + 50 * k), 0, 0, 0);
+    d.time_boot_ms = (uint32_t)(5001 + 50 * k);
+    d.id = k % 2 ? 4 : 7;
+    d.current_distance = k % 2 ? 300 : 200;
+    mavlink_msg_distance_sensor_encode_status(SYSTEM, 1, &sender, &m, &d);
+    add(&m);
+    step((1100 + 50 * k) * MS);
+  }
+  step(4500 * MS);
+  for (k = 0; k < num_imu; ++k) {
+    if (samples[k].valid & TVS_IMU_ALTITUDE)
+      TEST_ASSERT_DOUBLE_WITHIN(1e-5, 3.0, samples[k].altitude_m);
+  }
+  TEST_ASSERT_TRUE(samples[40].valid & TVS_IMU_ALTITUDE);
+}
+
+/* Numbers that are none, and what no vehicle does: 5000 m, 300 m/s. */
+static void test_impossible_positions_are_left_out_and_counted(void) {
+  static const double z[4] = {NAN, -5000, -2, INFINITY}, vx[4] = {1, 1, 300, NAN};
+  int k, n;
+  begin();
+  attitude(5000, 0, 0, 0);
+  for (k = 0; k < 80; ++k) {
+    attitude((uint32_t)(5010 + 50 * k), 0, 0, 0);
+    position((uint32_t)(5020 + 50 * k), k % 2 ? z[k / 2 % 4] : -1.5, k % 2 ? vx[k / 2 % 4] : 1, 0,
+             0);
+    step((1100 + 50 * k) * MS);
+  }
+  step(6000 * MS);
+  for (k = n = 0; k < num_imu; ++k) {
+    if (samples[k].valid & TVS_IMU_ALTITUDE) {
+      TEST_ASSERT_TRUE(samples[k].altitude_m >= 1.499 && samples[k].altitude_m < 2.001);
+      ++n;
+    }
+    if (samples[k].valid & TVS_IMU_VELOCITY_Z)
+      TEST_ASSERT_DOUBLE_WITHIN(1e-5, 1, samples[k].velocity_m_s[0]);
+  }
+  TEST_ASSERT_TRUE(n > 40);
+  TEST_ASSERT_EQUAL_UINT64(30 + 20, tvm_session_num_invalid(session));
+}
+
 static void test_wrong_arguments_are_refused(void) {
   tvm_session_options options, bad;
   tvm_transport transport = {sizeof transport, NULL, take_sent, give, NULL, NULL};
@@ -364,6 +490,10 @@ int main(void) {
   RUN_TEST(test_bad_packets_are_counted_and_not_used);
   RUN_TEST(test_a_stray_stamp_is_no_reboot_and_a_reboot_is_one);
   RUN_TEST(test_the_link_tells_silence_and_asks_again);
+  RUN_TEST(test_a_distance_without_a_signal_is_no_height);
+  RUN_TEST(test_a_distance_has_its_direction_and_its_error);
+  RUN_TEST(test_of_two_distances_one_is_used);
+  RUN_TEST(test_impossible_positions_are_left_out_and_counted);
   RUN_TEST(test_wrong_arguments_are_refused);
   return UNITY_END();
 }

@@ -21,6 +21,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int64_t kMs = 1000000;
+// Of a stamp in microseconds: the number of the link, 0 for the only one.
+constexpr uint64_t kLinkBits = 3;
 
 // One packet of a telemetry log with its time.
 struct LoggedPacket {
@@ -29,7 +31,7 @@ struct LoggedPacket {
 };
 
 // A telemetry log: for each packet its time, microseconds since 1970 began, 8 bytes big-endian, and
-// its bytes.
+// its bytes. MAVLink's tools keep the number of the link in the two lowest bits of the time.
 class PacketLog {
  public:
   explicit PacketLog(const fs::path& path) : file_(path, std::ios::binary) {}
@@ -42,6 +44,7 @@ class PacketLog {
     uint64_t time_us = 0;
     for (int k = 0; k < 8; ++k) time_us = time_us << 8 | head[k];
     if (time_us > uint64_t{1} << 51) return false;  // in 2041
+    time_us &= ~kLinkBits;
     size_t size = 0;
     if (head[8] == 0xfd) {
       size = 12u + head[9] + ((head[10] & 1) != 0 ? 13u : 0u);
@@ -219,7 +222,7 @@ VehicleRecording::VehicleRecording(const fs::path& folder) : folder_(folder) {
 
 void VehicleRecording::add_packet(int64_t now_ns, const uint8_t* bytes, size_t size) {
   std::string entry;
-  const auto time_us = static_cast<uint64_t>(now_ns / 1000);
+  const auto time_us = static_cast<uint64_t>(now_ns / 1000) & ~kLinkBits;
   for (int k = 7; k >= 0; --k) entry += static_cast<char>(time_us >> (8 * k) & 255);
   entry.append(reinterpret_cast<const char*>(bytes), size);
   log_->append(entry);

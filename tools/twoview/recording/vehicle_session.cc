@@ -92,6 +92,7 @@ nlohmann::ordered_json VehicleSession::summary(double seconds) const {
           {"timesyncs", n.timesyncs},
           {"silences", n.silences},
           {"reboots", n.reboots},
+          {"readings_invalid", tvm_session_num_invalid(session_)},
           {"seconds", seconds}};
 }
 

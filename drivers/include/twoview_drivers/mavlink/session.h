@@ -165,6 +165,12 @@ TV_API tvm_autopilot tvm_session_autopilot(const tvm_session *session, int *syst
 /* Writes the counters. Either may be null. */
 TV_API void tvm_session_counters(const tvm_session *session, tvm_counters *counters);
 
+/* How many readings were left out because they are no measurements: a DISTANCE_SENSOR that says
+   that its signal is invalid (signal_quality 1) or is at or beyond the ends of its range, and a
+   height, a velocity or an attitude that is not finite or that no such vehicle has (above 3000 m,
+   150 m/s). Null: 0. */
+TV_API uint64_t tvm_session_num_invalid(const tvm_session *session);
+
 /* Fills *source with the vehicle's samples: the attitude and the angular rate at each ATTITUDE,
    with velocity and height interpolated to its time where their neighbours are near enough. A
    sample comes when these neighbours are known, at most 150 ms late. The last 64 samples are kept.
