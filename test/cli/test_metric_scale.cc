@@ -115,8 +115,51 @@ void test_altitude_divides_by_the_vertical_part_of_the_way() {
 void test_altitude_gives_nothing_in_level_flight_or_against_the_way() {
   TEST_ASSERT_FALSE(
       scale_by_altitude(circle(), 10.2, 11.7, {0.9, 0, -0.43}, 0.02, CameraMount()).has_value());
-  TEST_ASSERT_FALSE(
-      scale_by_altitude(climb(), 10.2, 11.7, {0.6, 0, 0.8}, 0.02, CameraMount()).has_value());
+  // Against the way: of that it is certain, and no scale.
+  const auto against = scale_by_altitude(climb(), 10.2, 11.7, {0.6, 0, 0.8}, 0.02, CameraMount());
+  TEST_ASSERT_TRUE(against.has_value() && against->baseline_m < 0);
+  TEST_ASSERT_FALSE(best_scale({against}).has_value());
+}
+
+// Two sources that contradict each other leave no scale, and both are named.
+void test_contrary_sources_give_no_scale() {
+  const MetricScale velocity{"velocity", 1.0, 0.05}, late{"velocity", 0.93, 0.05};
+  for (const double factor : {1000.0, 100.0, 2.0, -1.0, 0.01}) {
+    const MetricScale altitude{"altitude", factor, 0.04 * std::abs(factor)};
+    const auto contrary = contrary_scales({velocity, std::nullopt, altitude});
+    TEST_ASSERT_TRUE(contrary.has_value());
+    TEST_ASSERT_EQUAL_STRING("velocity", contrary->one.source.c_str());
+    TEST_ASSERT_EQUAL_STRING("altitude", contrary->other.source.c_str());
+    TEST_ASSERT_FALSE(best_scale({velocity, std::nullopt, altitude}).has_value());
+  }
+  TEST_ASSERT_FALSE(contrary_scales({velocity, late}).has_value());
+  TEST_ASSERT_TRUE(best_scale({velocity, late}).has_value());
+  // One that is too vague to be taken is no contradiction either.
+  TEST_ASSERT_TRUE(best_scale({velocity, MetricScale{"floor", 9, 3}}).has_value());
+}
+
+// The way of velocities has a direction, too.
+void test_velocity_against_the_way_gives_no_scale() {
+  const auto plain = scale_by_velocity(circle(), 10.2, 11.7, CameraMount());
+  TEST_ASSERT_TRUE(plain.has_value());
+  // A unit vector that makes no angle with the way is the one whose part of it is the largest.
+  double best = 0, best_sigma = 0, worst = 0;
+  for (int k = 0; k < 360; ++k) {
+    const double angle = k * kPi / 180;
+    const Vector3 unit_way = {std::cos(angle), std::sin(angle), 0};
+    const auto scale = scale_by_velocity(circle(), 10.2, 11.7, CameraMount(), unit_way);
+    const auto back = scale_by_velocity(circle(), 11.7, 10.2, CameraMount(),
+                                        Vector3{-unit_way[0], -unit_way[1], 0});
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, scale->baseline_m, back->baseline_m);
+    if (scale->baseline_m > best) best = scale->baseline_m, best_sigma = scale->sigma_m;
+    worst = std::min(worst, scale->baseline_m);
+    const double share = scale->baseline_m / plain->baseline_m;
+    TEST_ASSERT_TRUE(share <= 0.9 || best_scale({scale}).has_value());
+    TEST_ASSERT_TRUE(share >= 0.7 || !best_scale({scale}).has_value());
+  }
+  TEST_ASSERT_DOUBLE_WITHIN(1e-3 * plain->baseline_m, plain->baseline_m, best);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-3 * plain->baseline_m, plain->sigma_m, best_sigma);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-3 * plain->baseline_m, -plain->baseline_m, worst);
 }
 
 // Points of a floor 1.5 m below the camera and of things that stand on it, for a baseline of 0.25
@@ -163,7 +206,7 @@ void test_no_floor_gives_no_scale() {
 }
 
 void test_the_surest_source_wins_and_a_vague_one_is_none() {
-  const MetricScale a{"velocity", 1.0, 0.1}, b{"altitude", 2.0, 0.1}, c{"floor", 1.0, 0.5};
+  const MetricScale a{"velocity", 1.0, 0.1}, b{"altitude", 1.1, 0.05}, c{"floor", 1.0, 0.5};
   TEST_ASSERT_EQUAL_STRING("altitude", best_scale({a, b, c})->source.c_str());
   TEST_ASSERT_EQUAL_STRING("velocity", best_scale({std::nullopt, a})->source.c_str());
   TEST_ASSERT_FALSE(best_scale({c, std::nullopt}).has_value());
@@ -197,6 +240,8 @@ int main() {
   RUN_TEST(test_a_seen_floor_gives_the_scale);
   RUN_TEST(test_no_floor_gives_no_scale);
   RUN_TEST(test_the_surest_source_wins_and_a_vague_one_is_none);
+  RUN_TEST(test_contrary_sources_give_no_scale);
+  RUN_TEST(test_velocity_against_the_way_gives_no_scale);
   RUN_TEST(test_attitudes_are_between_their_neighbours_and_never_guessed);
   return UNITY_END();
 }

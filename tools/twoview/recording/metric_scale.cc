@@ -17,6 +17,9 @@ constexpr double kLayer = 0.04;  // thickness of a floor as a share of its dista
 constexpr size_t kLeastFloor = 20;    // least number of points of a floor
 constexpr double kFloorShare = 0.05;  // least share of all points that a floor must hold
 constexpr double kWorstShare = 0.25;
+// Two sources contradict each other above the quantile 0.999 of chi squared of one degree of
+// freedom.
+constexpr double kContradicted = 10.83;
 
 Vector3 plus(const Vector3& a, const Vector3& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
 Vector3 minus(const Vector3& a, const Vector3& b) {
@@ -71,6 +74,10 @@ std::optional<std::pair<double, double>> altitude_at(const FlightLog& log, doubl
   return std::make_pair(sum / count, sigma);
 }
 
+bool is_usable(const std::optional<MetricScale>& scale) {
+  return scale && scale->sigma_m <= kWorstShare * std::abs(scale->baseline_m);
+}
+
 double camera_height(const FlightSample& at, double altitude, const CameraMount& mount) {
   return altitude - applied(at.world_from_body, mount.position)[2];
 }
@@ -99,7 +106,8 @@ std::optional<FlightSample> sample_at(const FlightLog& log, double time_s, doubl
 }
 
 std::optional<MetricScale> scale_by_velocity(const FlightLog& log, double time0_s, double time1_s,
-                                             const CameraMount& mount) {
+                                             const CameraMount& mount,
+                                             const std::optional<Vector3>& unit_way) {
   const double from = std::min(time0_s, time1_s), to = std::max(time0_s, time1_s);
   const std::optional<FlightSample> first = sample_at(log, from, kMaxGapS);
   const std::optional<FlightSample> last = sample_at(log, to, kMaxGapS);
@@ -121,8 +129,15 @@ std::optional<MetricScale> scale_by_velocity(const FlightLog& log, double time0_
   }
   way = plus(way, minus(applied(last->world_from_body, mount.position),
                         applied(first->world_from_body, mount.position)));
-  const MetricScale scale{"velocity", norm(way), sigma * (to - from)};
+  MetricScale scale{"velocity", norm(way), sigma * (to - from)};
   if (!(scale.baseline_m > 3 * scale.sigma_m)) return {};
+  if (unit_way) {
+    // Another direction than that of the pictures: what lies between the way and its part along
+    // theirs is uncertain.
+    const double along = (time0_s <= time1_s ? 1 : -1) * dot(way, *unit_way);
+    scale.sigma_m = std::hypot(scale.sigma_m, scale.baseline_m - along);
+    scale.baseline_m = along;
+  }
   return scale;
 }
 
@@ -137,7 +152,7 @@ std::optional<MetricScale> scale_by_altitude(const FlightLog& log, double time0_
       camera_height(*at1, altitude1->first, mount) - camera_height(*at0, altitude0->first, mount);
   const double climb_sigma = std::hypot(altitude0->second, altitude1->second);
   const double up = -unit_way[2];
-  if (!(std::abs(climb) > 3 * climb_sigma) || !(climb * up > 0)) return {};
+  if (!(std::abs(climb) > 3 * climb_sigma) || up == 0) return {};
   // An error of angle e in the direction changes its vertical component by e times its horizontal
   // component.
   const double level = std::sqrt(std::max(0.0, 1 - up * up));
@@ -191,10 +206,25 @@ std::optional<MetricScale> scale_by_floor(const FlightLog& log, double time0_s,
   return {};
 }
 
+std::optional<ContraryScales> contrary_scales(
+    const std::vector<std::optional<MetricScale>>& found) {
+  for (size_t i = 0; i < found.size(); ++i) {
+    for (size_t k = i + 1; k < found.size(); ++k) {
+      if (!is_usable(found[i]) || !is_usable(found[k])) continue;
+      const double difference = found[i]->baseline_m - found[k]->baseline_m;
+      const double sigma = std::hypot(found[i]->sigma_m, found[k]->sigma_m);
+      if (difference * difference > kContradicted * sigma * sigma)
+        return ContraryScales{*found[i], *found[k]};
+    }
+  }
+  return {};
+}
+
 std::optional<MetricScale> best_scale(const std::vector<std::optional<MetricScale>>& found) {
+  if (contrary_scales(found)) return {};
   std::optional<MetricScale> best;
   for (const std::optional<MetricScale>& scale : found) {
-    if (!scale || scale->sigma_m > kWorstShare * scale->baseline_m) continue;
+    if (!is_usable(scale) || !(scale->baseline_m > 0)) continue;
     if (!best || scale->sigma_m * best->baseline_m < best->sigma_m * scale->baseline_m)
       best = scale;
   }

@@ -37,16 +37,20 @@ struct CameraMount {
 std::optional<FlightSample> sample_at(const FlightLog& log, double time_s, double max_gap_s);
 
 // Scale by velocity: the body velocity is rotated to the world and integrated (trapezoids) from
-// time0 to time1, and the motion of the camera relative to the body is added. Empty if the log has
-// a gap of more than 0.25 s, a sample without velocity or two runs, or if the distance is at most 3
+// time0 to time1, and the motion of the camera relative to the body is added. With unit_way, the
+// unit vector in the world from camera 0 to camera 1 as the pictures say, the baseline is the part
+// along it, and what is missing to the whole way belongs to its sigma. Empty if the log has a gap
+// of more than 0.25 s, a sample without velocity or two runs, or if the distance is at most 3
 // sigma.
 std::optional<MetricScale> scale_by_velocity(const FlightLog& log, double time0_s, double time1_s,
-                                             const CameraMount& mount);
+                                             const CameraMount& mount,
+                                             const std::optional<Vector3>& unit_way = {});
 
 // Scale by altitude: the camera's climb divided by the upward component of unit_way, the unit
 // vector in the world from camera 0 to camera 1. direction_sigma_rad is the standard deviation of
 // its direction. Empty if an altitude or attitude is unknown, if the instants belong to two runs,
-// if the climb is at most 3 sigma, or if its sign is not that of the upward component.
+// or if the climb is at most 3 sigma. Negative where the altitude sinks and the camera climbs: it
+// contradicts all others.
 std::optional<MetricScale> scale_by_altitude(const FlightLog& log, double time0_s, double time1_s,
                                              const Vector3& unit_way, double direction_sigma_rad,
                                              const CameraMount& mount);
@@ -59,7 +63,15 @@ std::optional<MetricScale> scale_by_floor(const FlightLog& log, double time0_s,
                                           const std::vector<Vector3>& points,
                                           const CameraMount& mount);
 
-// The scale with the smallest relative sigma, if that is at most 0.25; otherwise empty.
+// Two sources that contradict each other by more than their sigmas: nobody knows which is wrong.
+struct ContraryScales {
+  MetricScale one, other;
+};
+// The first two of those whose relative sigma is at most 0.25, else empty.
+std::optional<ContraryScales> contrary_scales(const std::vector<std::optional<MetricScale>>& found);
+
+// The scale with the smallest relative sigma, if that is at most 0.25; empty otherwise, and where
+// two sources contradict each other.
 std::optional<MetricScale> best_scale(const std::vector<std::optional<MetricScale>>& found);
 
 }  // namespace cli

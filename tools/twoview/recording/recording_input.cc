@@ -80,7 +80,21 @@ struct RecordingInput::State {
   RecordedFlight flight;
   RecordingPair pair;
   bool gravity_used = false;
+  std::optional<ContraryScales> contrary;
 };
+
+namespace {
+
+nlohmann::ordered_json contradiction_json(const std::optional<ContraryScales>& contrary) {
+  if (!contrary) return nullptr;
+  nlohmann::ordered_json list;
+  for (const MetricScale& scale : {contrary->one, contrary->other})
+    list.push_back(
+        {{"source", scale.source}, {"baseline_m", scale.baseline_m}, {"sigma_m", scale.sigma_m}});
+  return list;
+}
+
+}  // namespace
 
 void RecordingOptions::add_to(CLI::App& verb) {
   verb.add_option("--recording", folder,
@@ -135,7 +149,9 @@ void RecordingInput::add_gravity(tv_estimate_options& options) {
 }
 
 void RecordingInput::add_scale(Outcome& outcome) const {
-  outcome.scale = best_scale(scales_of(state_->flight, state_->pair.frame, state_->mount, outcome));
+  const auto found = scales_of(state_->flight, state_->pair.frame, state_->mount, outcome);
+  outcome.scale = best_scale(found);
+  state_->contrary = contrary_scales(found);
 }
 
 void RecordingInput::add_json(Outcome& outcome) const {
@@ -143,6 +159,8 @@ void RecordingInput::add_json(Outcome& outcome) const {
   const RecordedFrame* frames = s.pair.frame;
   outcome.json["imu"] =
       imu_json(s.flight, frames, s.mount, outcome.two_view, s.gravity_used, outcome.scale);
+  if (outcome.json["imu"].is_object())
+    outcome.json["imu"]["scale_contradiction"] = contradiction_json(s.contrary);
   outcome.json["recording"] = {{"folder", s.options.folder},
                                {"frames", {frames[0].index, frames[1].index}},
                                {"frame_numbers", {frames[0].number, frames[1].number}},
@@ -169,6 +187,13 @@ std::string RecordingInput::words(const Outcome& outcome) const {
     text += summary_line("scale", "one baseline is %.3f m (sigma %.3f), by %s",
                          outcome.scale->baseline_m, outcome.scale->sigma_m,
                          outcome.scale->source.c_str());
+  else if (s.contrary)
+    text += summary_line("scale",
+                         "unknown: one baseline is %.3f m (sigma %.3f) by %s, and %.3f m (%.3f) by "
+                         "%s, which contradict each other",
+                         s.contrary->one.baseline_m, s.contrary->one.sigma_m,
+                         s.contrary->one.source.c_str(), s.contrary->other.baseline_m,
+                         s.contrary->other.sigma_m, s.contrary->other.source.c_str());
   else
     text += summary_line("scale", "%s",
                          "unknown: neither velocity, altitude nor a floor tells it here");

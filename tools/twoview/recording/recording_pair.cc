@@ -272,7 +272,7 @@ std::vector<std::optional<MetricScale>> scales_of(const RecordedFlight& flight,
     if (p.status == TV_POINT_OK) points.push_back({p.position[0], p.position[1], p.position[2]});
   }
   const double time0 = frames[0].time_s, time1 = frames[1].time_s;
-  return {scale_by_velocity(flight.log, time0, time1, mount),
+  return {scale_by_velocity(flight.log, time0, time1, mount, way),
           scale_by_altitude(flight.log, time0, time1, way, direction_sigma, mount),
           scale_by_floor(flight.log, time0, points, mount)};
 }
