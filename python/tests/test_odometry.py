@@ -103,7 +103,7 @@ def test_a_known_frame_is_located(frames, flight):
 def test_bad_input_is_refused(frames):
     with tv.Odometry(CAMERA) as odometry:
         odometry.track(frames[0], 1.0)
-        with pytest.raises(tv.TV_ERR_ARGUMENT):
+        with pytest.raises(tv.TV_ERR_TIME):
             odometry.track(frames[1], 1.0)  # the time stands
         with pytest.raises(tv.TV_ERR_NOT_FINITE):
             odometry.track(frames[1], float("nan"))
@@ -114,6 +114,7 @@ def test_bad_input_is_refused(frames):
         with pytest.raises(ValueError, match="world_from_cam"):
             odometry.track(frames[1], 2.0, world_from_cam=np.eye(4))
         assert odometry.track(frames[1], 2.0).num_frames == 2
+        assert odometry.track(frames[2], 0.0, gap=True).num_frames == 3  # the stream began anew
     with pytest.raises(ValueError, match="closed"):
         odometry.track(frames[1], 3.0)
     with pytest.raises(tv.TV_ERR_ARGUMENT):

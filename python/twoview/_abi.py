@@ -247,8 +247,10 @@ class tv_odometry_state(Structure):
                 ("reference_from_cam_R", c_double * 9), ("reference_from_cam_t", c_double * 3),
                 ("world_from_cam_R", c_double * 9), ("world_from_cam_t", c_double * 3),
                 ("covariance", c_double * 36), ("noise_px", c_double), ("scale_source", c_int32),
-                ("reserved2", c_int32), ("scale_sigma", c_double),
-                ("principal_point_shift_px", c_double * 2)]
+                ("scale_contradicted", c_int32), ("scale_sigma", c_double),
+                ("principal_point_shift_px", c_double * 2), ("height_scale", c_double),
+                ("height_scale_sigma", c_double), ("velocity_scale", c_double),
+                ("velocity_scale_sigma", c_double)]
 
 
 class tv_keyframe(Structure):
@@ -430,6 +432,14 @@ class TV_ERR_KERNELS(StatusError):
 
 class TV_ERR_MAP(StatusError, ValueError):
     status = Status.ERR_MAP
+
+
+class TV_ERR_TIME(StatusError, ValueError):
+    status = Status.ERR_TIME
+
+
+class TV_ERR_STRIDE(StatusError, ValueError):
+    status = Status.ERR_STRIDE
 
 
 ERRORS = {int(kind.status): kind for kind in StatusError.__subclasses__()}

@@ -20,6 +20,8 @@ class Status(IntEnum):
     ERR_OUTSIDE = 11
     ERR_KERNELS = 12
     ERR_MAP = 13
+    ERR_TIME = 14
+    ERR_STRIDE = 15
 
 
 class Kernels(IntEnum):

@@ -45,6 +45,9 @@ class OdometryState:
     scale_source: ScaleSource  #: where the unit of lengths comes from
     scale_sigma: Optional[float]  #: relative; None where the unit is not the metre
     principal_point_shift_px: np.ndarray  #: (2,), from where the camera has it; zeros: not moved
+    scale_contradicted: bool  #: heights and velocities contradict each other: there is no metre
+    height_scale: Optional[tuple[float, float]]  #: metres per unit, and sigma, by heights alone
+    velocity_scale: Optional[tuple[float, float]]  #: the same by velocities alone
 
 
 @dataclass(frozen=True)
@@ -117,7 +120,8 @@ class Odometry:
         """tv_odometry_track: tracks a frame, and extends and adjusts the map.
 
         image: (height, width) uint8, of the camera's size. time_s: later than that of the frame
-        before. gap: frames are missing before this one. world_from_cam: (3, 3), the vehicle's
+        before; with gap any time. gap: frames are missing before this one, or the stream began
+        anew. world_from_cam: (3, 3), the vehicle's
         attitude in a world whose z axis points down. Measurements with a sigma of 0 do not
         exist."""
         frame = self.library.make(_abi.tv_odometry_frame, {
@@ -238,4 +242,6 @@ def _state(s: Any) -> OdometryState:
         _matrix(s.world_from_cam_t, 3) if posed else None,
         _matrix(s.covariance, 6, 6) if s.has_covariance else None, s.noise_px, scale,
         s.scale_sigma if scale != ScaleSource.UNIT else None,
-        _matrix(s.principal_point_shift_px, 2))
+        _matrix(s.principal_point_shift_px, 2), bool(s.scale_contradicted),
+        (s.height_scale, s.height_scale_sigma) if s.height_scale_sigma > 0 else None,
+        (s.velocity_scale, s.velocity_scale_sigma) if s.velocity_scale_sigma > 0 else None)

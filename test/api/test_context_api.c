@@ -284,7 +284,7 @@ static void test_strings_name_every_value(void) {
       TEST_ASSERT_TRUE(strcmp(tv_status_string((tv_status)k), tv_status_string((tv_status)other)));
     }
   }
-  TEST_ASSERT_EQUAL_STRING("unknown status", tv_status_string((tv_status)14));
+  TEST_ASSERT_EQUAL_STRING("unknown status", tv_status_string((tv_status)16));
   TEST_ASSERT_EQUAL_STRING("unknown status", tv_status_string((tv_status)-1));
   TEST_ASSERT_EQUAL_STRING(TV_VERSION_STRING, tv_version_string());
 }

@@ -218,7 +218,7 @@ static void test_bad_frames_are_refused(void) {
   tv_odometry_frame good;
   fly(odometry, 3);
   save(odometry, map, &num_map);
-  expect_refused(TV_ERR_ARGUMENT); /* the time stands */
+  expect_refused(TV_ERR_TIME); /* it stands */
   frame.time_s += 1;
   good = frame;
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_track(NULL, &frame, &state));
@@ -229,10 +229,10 @@ static void test_bad_frames_are_refused(void) {
   state.struct_size = 2, expect_refused(TV_ERR_STRUCT_SIZE), state.struct_size = sizeof state;
   frame.image.width -= 1, expect_refused(TV_ERR_CAMERA), frame = good;
   frame.image.height += 1, expect_refused(TV_ERR_CAMERA), frame = good;
-  frame.image.stride_bytes -= 1, expect_refused(TV_ERR_ARGUMENT), frame = good;
-  frame.image.stride_bytes = INT64_MAX, expect_refused(TV_ERR_ARGUMENT), frame = good;
+  frame.image.stride_bytes -= 1, expect_refused(TV_ERR_STRIDE), frame = good;
+  frame.image.stride_bytes = INT64_MAX, expect_refused(TV_ERR_STRIDE), frame = good;
   frame.gap = 2, expect_refused(TV_ERR_ARGUMENT), frame = good;
-  frame.time_s = 0, expect_refused(TV_ERR_ARGUMENT), frame = good;
+  frame.time_s = 0, expect_refused(TV_ERR_TIME), frame = good;
   frame.time_s = NAN, expect_refused(TV_ERR_NOT_FINITE), frame = good;
   frame.time_s = INFINITY, expect_refused(TV_ERR_NOT_FINITE), frame = good;
   frame.image.data = (const uint8_t *)&state, expect_refused(TV_ERR_OVERLAP), frame = good;
@@ -517,6 +517,28 @@ static void test_velocities_say_nothing_of_a_gap(void) {
   }
 }
 
+/* A stream that restarts with its clock: the map goes on, the time that passed is not known, and
+   from there on times rise again. */
+static void test_a_clock_may_begin_anew_with_a_gap(void) {
+  const double step_s = 1.0 / 30;
+  double before_s;
+  int k;
+  fly(odometry, 3);
+  before_s = frame.time_s;
+  for (k = 0; k < 6; ++k) {
+    room_flight(num_flown + k, pixels);
+    frame.time_s = k == 0 ? 0 : frame.time_s + step_s;
+    frame.gap = k == 0;
+    frame.velocity_m_s[0] = 10, frame.velocity_sigma_m_s = 0.01; /* of this way: contrary */
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_track(odometry, &frame, &state));
+    TEST_ASSERT_TRUE(state.has_pose && state.segment == 0 && !state.relocated);
+    TEST_ASSERT_EQUAL_INT(k > 0, (state.reasons & TV_REASON_SECOND_MOTION) != 0);
+  }
+  TEST_ASSERT_TRUE(frame.time_s < before_s);
+  frame.gap = 0, frame.time_s -= step_s;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_TIME, tv_odometry_track(odometry, &frame, &state));
+}
+
 /* Walls look alike: a lost frame is not found where its attitude contradicts the map. */
 static void test_a_lost_frame_is_found_where_its_attitude_allows(void) {
   static const double level[9] = {0, 0, 1, 1, 0, 0, 0, 1, 0},
@@ -718,7 +740,7 @@ static void test_a_frame_is_located_without_changing_the_map(void) {
   image.data = pixels, image.width = 16;
   TEST_ASSERT_EQUAL_INT(TV_ERR_CAMERA, tv_odometry_locate(odometry, &image, 0, &found));
   image = frame.image, image.stride_bytes = 1;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_odometry_locate(odometry, &image, 0, &found));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_STRIDE, tv_odometry_locate(odometry, &image, 0, &found));
   found.struct_size = 1;
   TEST_ASSERT_EQUAL_INT(TV_ERR_STRUCT_SIZE, tv_odometry_locate(odometry, &frame.image, 0, &found));
 }
@@ -1226,6 +1248,7 @@ int main(void) {
   RUN_TEST(test_a_segment_is_weak_until_a_pair_of_keyframes_confirms_it);
   RUN_TEST(test_doubts_stay_with_their_segment);
   RUN_TEST(test_velocities_say_nothing_of_a_gap);
+  RUN_TEST(test_a_clock_may_begin_anew_with_a_gap);
   RUN_TEST(test_a_lost_frame_is_found_where_its_attitude_allows);
   RUN_TEST(test_a_lost_frame_is_found_where_its_pose_is_beyond_doubt);
   RUN_TEST(test_finish_adjusts_the_newest_keyframe);

@@ -1,5 +1,6 @@
-/* Tests of the odometry with velocities: they give the metre, and contradict a map that is carried
-   away. It flies through the room of support/room_scene.h. */
+/* Tests of the odometry with velocities and heights: they give the metre, contradict each other,
+   and velocities contradict a map that is carried away. It flies through the room of
+   support/room_scene.h. */
 #include <math.h>
 
 #include "support/api.h"
@@ -33,8 +34,8 @@ static void show(int n, int is_another_room) {
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_track(odometry, &frame, &state));
 }
 
-/* The frame with the camera's true velocity, each component times a factor. */
-static void give_of(int n, const double factors[3], int is_another_room) {
+/* The camera's true velocity at frame n, in its axes, each component times a factor. */
+static void measure_velocity(int n, const double factors[3]) {
   const double yaw = 0.12 * sin(0.06 * n), c = cos(yaw), s = sin(yaw);
   double here[3], before[3], v[3];
   int k;
@@ -44,6 +45,11 @@ static void give_of(int n, const double factors[3], int is_another_room) {
   frame.velocity_m_s[1] = factors[1] * v[1];
   frame.velocity_m_s[2] = factors[2] * (s * v[0] + c * v[2]);
   frame.velocity_sigma_m_s = 0.02;
+}
+
+/* The frame with the camera's true velocity, each component times a factor. */
+static void give_of(int n, const double factors[3], int is_another_room) {
+  measure_velocity(n, factors);
   show(n, is_another_room);
 }
 
@@ -206,8 +212,120 @@ static void test_a_segment_that_never_agreed_is_removed(void) {
   TEST_ASSERT_EQUAL_INT(2, state.segment);
 }
 
+/* The frame with an attitude, the height times a factor, and the velocity of an earlier frame times
+   another one. */
+static void give_both(int n, double height_factor, double velocity_factor, int num_late) {
+  static const double level[9] = {0, 0, 1, 1, 0, 0, 0, 1, 0};
+  const double factors[3] = {velocity_factor, velocity_factor, velocity_factor};
+  double centre[3];
+  memcpy(frame.world_from_cam, level, sizeof level);
+  frame.attitude_sigma_rad = 0.02;
+  centre_at(n, centre); /* y is down */
+  frame.height_m = 1.5 - height_factor * centre[1];
+  frame.height_sigma_m = 0.01;
+  measure_velocity(n - num_late, factors);
+  show(n, 0);
+}
+
+enum { BOTH = 100, BOTH_LEVEL = 86 }; /* at which the height is that of the start */
+
+static void test_heights_and_velocities_that_agree_give_the_metre(void) {
+  int n;
+  for (n = 0; n < BOTH; ++n) {
+    give_both(n, 1, 1, 0);
+    TEST_ASSERT_EQUAL_INT32(0, state.scale_contradicted);
+  }
+  TEST_ASSERT_EQUAL_INT(TV_SCALE_HEIGHT_AND_VELOCITY, state.scale_source);
+  TEST_ASSERT_TRUE(state.scale_sigma >= 0.01 && state.scale_sigma < 0.03);
+  TEST_ASSERT_DOUBLE_WITHIN(3 * state.height_scale_sigma, 1, state.height_scale);
+  TEST_ASSERT_DOUBLE_WITHIN(3 * state.velocity_scale_sigma + 0.01, 1, state.velocity_scale);
+}
+
+/* Of two sensors one has another unit or sign. There is no metre, and never a number between them;
+   each one's own number is in the state. A height of the other sign is that of a depth; velocities
+   of the other sign contradict the map itself, and say nothing. */
+static void test_heights_and_velocities_that_contradict_give_no_metre(void) {
+  static const double heights[6] = {1000, 100, 2, 0.01, -1, 1}, velocities[6] = {1, 1, 1, 1, 1, 2};
+  int k, n;
+  for (k = 0; k < 6; ++k) {
+    if (k > 0) setUp();
+    for (n = 0; n < BOTH; ++n) give_both(n, heights[k], velocities[k], 0);
+    TEST_ASSERT_TRUE(state.has_pose);
+    TEST_ASSERT_EQUAL_INT(TV_SCALE_UNIT, state.scale_source);
+    TEST_ASSERT_EQUAL_DOUBLE(0, state.scale_sigma);
+    TEST_ASSERT_EQUAL_INT32(1, state.scale_contradicted);
+    TEST_ASSERT_DOUBLE_WITHIN(
+        0.2, 1, state.height_scale / state.velocity_scale * velocities[k] / heights[k]);
+  }
+}
+
+/* A map in metres is no longer in metres when the contradiction comes, and does not change to and
+   fro; its lengths stay as they are. */
+static void test_a_contradiction_stays_until_the_sensors_agree(void) {
+  int n, num_changes = 0, was = 1;
+  double before[3], after[3];
+  for (n = 0; n < BOTH_LEVEL; ++n) give_both(n, 1, 1, 0);
+  TEST_ASSERT_EQUAL_INT(TV_SCALE_HEIGHT_AND_VELOCITY, state.scale_source);
+  memcpy(before, state.world_from_cam_t, sizeof before);
+  for (; n < 2 * BOTH; ++n) {
+    give_both(n, 4, 1, 0);
+    num_changes += was != (state.scale_source != TV_SCALE_UNIT);
+    was = state.scale_source != TV_SCALE_UNIT;
+    if (n == BOTH_LEVEL) memcpy(after, state.world_from_cam_t, sizeof after);
+  }
+  TEST_ASSERT_EQUAL_INT(1, num_changes);
+  TEST_ASSERT_EQUAL_INT32(1, state.scale_contradicted);
+  TEST_ASSERT_DOUBLE_WITHIN(0.1, before[0], after[0]);
+}
+
+/* Velocities that come late do not have the map's directions: the metre is as uncertain as that
+   makes it, or there is none. */
+static void test_late_velocities_make_the_metre_uncertain(void) {
+  double here[3], there[3], truth = 0, way = 0, from[3];
+  int n, k;
+  for (n = 0; n < BOTH; ++n) {
+    give_both(n, 1, 1, 9);
+    if (n == BOTH - 12) memcpy(from, state.world_from_cam_t, sizeof from);
+  }
+  centre_at(n - 1, here), centre_at(BOTH - 12, there);
+  for (k = 0; k < 3; ++k) truth += pow(here[k] - there[k], 2);
+  for (k = 0; k < 3; ++k) way += pow(state.world_from_cam_t[k] - from[k], 2);
+  TEST_ASSERT_TRUE(state.scale_source == TV_SCALE_UNIT ||
+                   fabs(sqrt(way / truth) - 1) < 3 * state.scale_sigma);
+  TEST_ASSERT_TRUE(state.velocity_scale_sigma > 0.05);
+}
+
+/* A map keeps what is known of its scale, and a contradiction leaves nothing that is known. */
+static void test_a_map_keeps_its_scale_but_no_contradiction(void) {
+  static uint8_t bytes[MEMORY], again[MEMORY];
+  size_t num = 0, num_again = 0;
+  int k, n;
+  for (k = 0; k < 2; ++k) {
+    if (k > 0) setUp();
+    for (n = 0; n < BOTH; ++n) give_both(n, k == 0 ? 1 : 3, 1, 0);
+    TEST_ASSERT_EQUAL_INT32(k, state.scale_contradicted);
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_save(odometry, bytes, MEMORY, &num));
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_load(odometry, bytes, num));
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_save(odometry, again, MEMORY, &num_again));
+    TEST_ASSERT_EQUAL_UINT64(num, num_again);
+    TEST_ASSERT_EQUAL_MEMORY(bytes + 16, again + 16, 208 - 16); /* to the scale's end */
+    frame.height_sigma_m = frame.velocity_sigma_m_s = 0;
+    frame.gap = 1;
+    show(n - 1, 0);
+    frame.gap = 0;
+    TEST_ASSERT_EQUAL_INT(k == 0 ? TV_SCALE_HEIGHT_AND_VELOCITY : TV_SCALE_UNIT,
+                          state.scale_source);
+    TEST_ASSERT_EQUAL_INT32(0, state.scale_contradicted);
+  }
+}
+
 int main(void) {
   UNITY_BEGIN();
+  RUN_TEST(test_heights_and_velocities_that_agree_give_the_metre);
+  RUN_TEST(test_heights_and_velocities_that_contradict_give_no_metre);
+  RUN_TEST(test_a_contradiction_stays_until_the_sensors_agree);
+  RUN_TEST(test_late_velocities_make_the_metre_uncertain);
+  RUN_TEST(test_a_map_keeps_its_scale_but_no_contradiction);
   RUN_TEST(test_right_velocities_give_the_metre);
   RUN_TEST(test_velocities_that_were_right_contradict_the_map);
   RUN_TEST(test_another_direction_contradicts_the_map);

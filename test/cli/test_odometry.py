@@ -424,6 +424,20 @@ class OdometryTest(CliTest):
         self.assertEqual(self.trajectory(), unmeasured)
         self.assertTrue(self.result()["options"]["no_imu"])
 
+    def test_heights_and_velocities_that_no_drone_has_are_left_out_and_counted(self):
+        source = self.set_folder()
+        lines = [f"{t:.9f} 1 0 0 0 0.01 1.5 0.015 0 {0.1 * FPS} 0 0.02" for t in TIMES]
+        lines[5] = lines[5].replace(" 1.5 ", " 5000 ")
+        lines[9] = lines[9].replace(f" {0.1 * FPS} ", " 300 ")
+        lines[10] = lines[10].replace(f" {0.1 * FPS} ", " -1e9 ")
+        self.imu(lines=lines)
+        done = self.succeed(self.odometry(source))
+        self.assertIn("1 heights above 3000 m and 2 velocities above 150 m/s were left out",
+                      (done.stdout + done.stderr).decode())
+        result = self.result()
+        self.assertEqual((result["scale"], result["scale_contradiction"]), ("metric", None))
+        self.assertAlmostEqual(result["truth"]["scale_ratio"], 1, delta=0.02)
+
     def test_a_lying_attitude_is_reported_and_left_out(self):
         source = self.set_folder()
         lines = [f"{t:.9f} 1 0 0 0 0.01 1.5 0.015 0 {0.1 * FPS} 0 0.02" for t in TIMES]

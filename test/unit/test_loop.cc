@@ -44,12 +44,12 @@ double scale_of_ways() {
   const tv::MetricScale kept = odometry->scale;
   odometry->scale = tv::MetricScale{};
   tv::add_ways(odometry, 1);
-  const double scale = odometry->scale.product / odometry->scale.square;
+  const double scale = odometry->scale.velocity.product / odometry->scale.velocity.square;
   odometry->scale = kept;
   return scale;
 }
 
-double known_scale() { return odometry->scale.product / odometry->scale.square; }
+double known_scale() { return odometry->scale.velocity.product / odometry->scale.velocity.square; }
 
 // The velocities say that each way is `metres` long for a unit of the map.
 void measure_ways(double metres) {

@@ -96,12 +96,13 @@ TV_API void tv_odometry_options_init_sized(tv_odometry_options *options, size_t 
 typedef struct tv_odometry_frame {
   /* The caller's sizeof, set by tv_odometry_frame_init. */
   uint32_t struct_size;
-  /* 1: frames are missing between the one before and this one, or the stream began anew; else 0.
-     The motion from frame to frame is then not predicted. */
+  /* 1: frames are missing between the one before and this one, or the stream began anew, perhaps
+     with its clock; else 0. The motion from frame to frame is then not predicted. */
   int32_t gap;
   /* The picture, of the camera's size. Its pixels are read during the call only. */
   tv_image image;
-  /* The time of the exposure in seconds, from any moment; later than that of the frame before. */
+  /* The time of the exposure in seconds, from any moment. Later than that of the frame before where
+     gap is 0; with gap 1 any time: one that is not later says that the clock began anew. */
   double time_s;
   /* The camera's attitude as the vehicle measures it, the row-major rotation world_from_cam, in a
      world whose z axis points down. Read only where attitude_sigma_rad is above 0. */
@@ -184,14 +185,21 @@ typedef struct tv_odometry_state {
   double noise_px;
   /* A tv_scale_source. */
   int32_t scale_source;
-  /* Always 0. */
-  int32_t reserved2;
+  /* 1 where heights and velocities contradict each other: the lengths that they give the map differ
+     by more than chance allows in 99 of 100 cases, by their standard deviations and how well each
+     fits the map. Nobody knows then which of them is wrong: scale_source is TV_SCALE_UNIT, also in
+     a map that was in metres, until they agree again. */
+  int32_t scale_contradicted;
   /* The standard deviation of the scale, relative to it; 0 where scale_source is TV_SCALE_UNIT. */
   double scale_sigma;
   /* By how far the principal point was moved from where it was given, in pixels (x, y): zeros where
      the camera was not corrected. When it moves, all keyframes turn by about the shift over the
      focal length, and the path and the map are adjusted in the frames that follow. */
   double principal_point_shift_px[2];
+  /* The metres of one unit of the segment as heights alone and velocities alone say, each with its
+     standard deviation: about 1 in a map in metres; zeros where nothing is known, or where it was
+     saved with the map, whose sensors are not told apart. */
+  double height_scale, height_scale_sigma, velocity_scale, velocity_scale_sigma;
 } tv_odometry_state;
 
 /* Writes zeros, and the size, into a struct of struct_size bytes; null is allowed. Programs call
@@ -229,9 +237,11 @@ TV_API tv_status tv_odometry_reset(tv_odometry *odometry);
    finite, and an attitude that is not a rotation, are left out of account; the call succeeds.
    state: initialised by tv_odometry_state_init. That the pose is not known is TV_OK, and reported
    in status.
-   Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_CAMERA (the image is not of the camera's size),
-   TV_ERR_ARGUMENT (the image's stride, gap; the time is not later than that of the frame before),
-   TV_ERR_NOT_FINITE (the time), TV_ERR_OVERLAP. With each of these the odometry is as before.
+   Each status names one argument: TV_ERR_NULL (a pointer, or that of the image's pixels),
+   TV_ERR_STRUCT_SIZE, TV_ERR_CAMERA (the image is not of the camera's size), TV_ERR_STRIDE (the
+   image's), TV_ERR_NOT_FINITE (the time), TV_ERR_ARGUMENT (gap is neither 0 nor 1), TV_ERR_TIME
+   (gap is 0, and the time is not later than that of the frame before), TV_ERR_OVERLAP (the state is
+   written over the frame or its pixels). With each of these the odometry is as before.
    Time: bounded by the options. Memory: the odometry's own. Equal frames give equal bytes on every
    CPU. */
 TV_API tv_status tv_odometry_track(tv_odometry *odometry, const tv_odometry_frame *frame,
@@ -255,7 +265,7 @@ TV_API tv_status tv_odometry_finish(tv_odometry *odometry);
    TV_ODOMETRY_TRACKING, TV_ODOMETRY_WEAK or TV_ODOMETRY_LOST, and its scale that of the segment
    which is tracked. near_id: the id of a keyframe whose surroundings are searched first; -1: no
    such hint. The frames that follow are tracked as if this one had not been looked for.
-   Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_CAMERA, TV_ERR_ARGUMENT, TV_ERR_OVERLAP. */
+   Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_CAMERA, TV_ERR_STRIDE, TV_ERR_OVERLAP. */
 TV_API tv_status tv_odometry_locate(tv_odometry *odometry, const tv_image *image, int32_t near_id,
                                     tv_odometry_state *state);
 

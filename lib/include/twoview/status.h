@@ -74,7 +74,13 @@ typedef enum tv_status {
   TV_ERR_KERNELS = 12,
   /* The bytes are no map, are cut or altered, or are of a version that this library does not know
      (tv_odometry_load). */
-  TV_ERR_MAP = 13
+  TV_ERR_MAP = 13,
+  /* A frame's time is not later than that of the frame before it, and its gap is 0
+     (tv_odometry_track). */
+  TV_ERR_TIME = 14,
+  /* The stride of a frame's image is below its width, or so large that its rows have no addresses
+     (tv_odometry_track, tv_odometry_locate). */
+  TV_ERR_STRIDE = 15
 } tv_status;
 
 /* Returns a short English phrase for a status, or "unknown status" for any other number. The string

@@ -104,6 +104,12 @@ tv_status make_plan(const tv_camera* camera, const tv_odometry_options* options,
   return status;
 }
 
+// Each argument of a frame has a status of its own.
+tv_status check_frame_image(const tv_odometry& odometry, const tv_image& image) {
+  const tv_status status = check_camera_image(odometry.camera.model, image);
+  return status == TV_ERR_ARGUMENT ? TV_ERR_STRIDE : status;
+}
+
 // Whether a state that is written overlaps what is read.
 bool overlaps(const tv_odometry_state* state, const void* input, size_t input_bytes,
               const tv_image& image) {
@@ -245,11 +251,12 @@ tv_status tv_odometry_track(tv_odometry* odometry, const tv_odometry_frame* fram
   tv_odometry_frame input{};
   tv_status status = tv::read_sized(frame, &input);
   if (status == TV_OK) status = tv::check_sized(state);
-  if (status == TV_OK) status = tv::check_camera_image(odometry->camera.model, input.image);
+  if (status == TV_OK) status = tv::check_frame_image(*odometry, input.image);
   if (status != TV_OK) return status;
   if (!tv::is_finite(input.time_s)) return TV_ERR_NOT_FINITE;
   if (!tv::within(input.gap, 0, 1)) return TV_ERR_ARGUMENT;
-  if (odometry->num_frames > 0 && !(input.time_s > odometry->last_time_s)) return TV_ERR_ARGUMENT;
+  if (odometry->num_frames > 0 && input.gap == 0 && !(input.time_s > odometry->last_time_s))
+    return TV_ERR_TIME;
   if (tv::overlaps(state, frame, frame->struct_size, input.image)) return TV_ERR_OVERLAP;
   tv_odometry_state packed{};
   tv::track_frame(odometry, input, &packed);
@@ -273,7 +280,7 @@ tv_status tv_odometry_locate(tv_odometry* odometry, const tv_image* image, int32
                              tv_odometry_state* state) {
   if (odometry == nullptr || image == nullptr || state == nullptr) return TV_ERR_NULL;
   tv_status status = tv::check_sized(state);
-  if (status == TV_OK) status = tv::check_camera_image(odometry->camera.model, *image);
+  if (status == TV_OK) status = tv::check_frame_image(*odometry, *image);
   if (status != TV_OK) return status;
   if (tv::overlaps(state, image, sizeof *image, *image)) return TV_ERR_OVERLAP;
   tv_odometry_state packed{};

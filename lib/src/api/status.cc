@@ -22,6 +22,8 @@ const char *tv_status_string(tv_status status) {
     case TV_ERR_OUTSIDE: return "outside the valid region of the lens model";
     case TV_ERR_KERNELS: return "this CPU or build lacks the kernel set";
     case TV_ERR_MAP: return "the bytes are no map of this version";
+    case TV_ERR_TIME: return "the time is not later than that of the frame before";
+    case TV_ERR_STRIDE: return "the image's stride does not fit its width";
     default: return "unknown status";
   }
 }

@@ -296,9 +296,7 @@ bool close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const 
   const MetricScale own = odometry->scale;
   enter_segment(odometry, old_segment);
   if (segment != old_segment) {
-    odometry->scale.product += end.scale * own.product;
-    odometry->scale.square += end.scale * end.scale * own.square;
-    odometry->scale.evidence |= own.evidence;
+    join_scale(own, end.scale, odometry);
   }
   fuse_points(odometry, keyframe, again);
   odometry->weak_loop.frame = -1;

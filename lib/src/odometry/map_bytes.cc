@@ -9,6 +9,7 @@
 #include "base/math.h"
 #include "geometry/essential.h"
 #include "odometry/calibration.h"
+#include "odometry/metric.h"
 
 namespace tv {
 namespace {
@@ -73,8 +74,9 @@ struct Header {
   int32_t next_point_id, next_keyframe_id;
   int32_t num_frames, num_segments, num_relocations, num_loops;
   int32_t is_upright;
-  MetricScale scale;
-  double principal_point[2];  // as it was moved: the camera is the one that was given
+  int32_t scale_source, evidence;       // tv_scale_source
+  double product, square, scale_sigma;  // of the scale: ScaleEstimate
+  double principal_point[2];            // as it was moved: the camera is the one that was given
 };
 
 // Numbers of one type that follow each other in their struct.
@@ -100,8 +102,8 @@ constexpr Numbers kOfHeader[] = {
     TV_NUMBERS(Header, num_bytes, num_bytes),
     TV_NUMBERS(Header, camera.model, camera.reserved),
     TV_NUMBERS(Header, camera.fx, camera.k),
-    TV_NUMBERS(Header, num_points, scale.evidence),
-    TV_NUMBERS(Header, scale.product, principal_point),
+    TV_NUMBERS(Header, num_points, evidence),
+    TV_NUMBERS(Header, product, principal_point),
 };
 constexpr Numbers kOfPoint[] = {
     TV_NUMBERS(MapPoint, position, position),     TV_NUMBERS(MapPoint, id, segment),
@@ -142,6 +144,17 @@ void pass_keypoint(Stream* s, MapKeypoint* keypoint, int32_t* seen) {
   pass_numbers(s, seen, sizeof *seen, sizeof *seen);
 }
 
+// Of a scale that was contradicted nothing is known to whoever reads the map.
+void write_scale(const MetricScale& scale, Header* h) {
+  if (scale.is_contradicted) return;
+  const ScaleEstimate estimate = estimate_of(scale);
+  h->scale_source = scale.source;
+  h->scale_sigma = scale.sigma;
+  h->evidence = estimate.source;
+  h->product = estimate.product;
+  h->square = estimate.square;
+}
+
 bool is_index(int32_t n, int32_t end) { return n >= 0 && n < end; }
 bool is_measure(double x, double sigma) { return is_finite(x) && is_finite(sigma) && sigma >= 0; }
 bool is_scale(double x) { return x >= 1 / kLargest && x <= kLargest; }
@@ -165,9 +178,9 @@ bool is_pose(const Rigid& pose) { return is_rotation(pose.R) && are_lengths(pose
 
 bool is_header(const Header& h) {
   return are_counts(&h.num_points, &h.num_loops) && is_index(h.is_upright, 2) &&
-         is_index(h.scale.source, 4) && is_index(h.scale.evidence, 4) &&
-         is_measure(h.scale.product, h.scale.square) &&
-         (h.scale.square > 0 || h.scale.product == 0) && is_measure(0, h.scale.sigma) &&
+         is_index(h.scale_source, 4) && is_index(h.evidence, 4) &&
+         is_measure(h.product, h.square) && (h.square > 0 || h.product == 0) &&
+         is_measure(0, h.scale_sigma) &&
          std::fabs(h.principal_point[0] - h.camera.cx) < h.camera.fx &&
          std::fabs(h.principal_point[1] - h.camera.cy) < h.camera.fx &&
          tv_camera_check(&h.camera) == TV_OK;
@@ -312,9 +325,9 @@ size_t write_map(const Odometry& odometry, uint8_t* to) {
       map.num_keyframes > 0 ? map.keyframes[map.num_keyframes - 1].segment : odometry.segment;
   h.is_upright = is_upright(map, segment);
   if (segment == odometry.segment)
-    h.scale = odometry.scale;
+    write_scale(odometry.scale, &h);
   else if (segment == odometry.other_segment)
-    h.scale = odometry.other_scale;
+    write_scale(odometry.other_scale, &h);
   Stream s{to, nullptr, 0, 0, false};
   pass(&s, &h, kOfHeader);
   for (int32_t n = 0; n < map.num_points; ++n) {
@@ -389,7 +402,7 @@ tv_status read_map(const uint8_t* bytes, size_t num_bytes, bool replaces, Odomet
   for (int n = 0; n < kCounts; ++n) (&odometry->num_frames)[n] += (&h.num_frames)[n];
   if (h.num_keyframes > 0) {
     enter_segment(odometry, map->keyframes[map->num_keyframes - 1].segment);
-    odometry->scale = h.scale;
+    odometry->scale = scale_of({h.evidence, h.product, h.square}, h.scale_source, h.scale_sigma);
   }
   if (map->num_keyframes > 0) {
     odometry->status = TV_ODOMETRY_LOST;

@@ -10,11 +10,18 @@
 namespace tv {
 namespace {
 
-constexpr double kLargestScaleSigma = 0.1;  // relative
+// Relative: the metre becomes the unit at the first, and is given up above the second.
+constexpr double kLargestScaleSigma = 0.1, kLostScaleSigma = 0.2;
+// Heights and velocities contradict each other above the quantile 0.99 of chi squared of one degree
+// of freedom. They agree again below that of 0.9, so that the unit does not change to and fro.
+constexpr double kContradicted = 6.63, kAgreed = 2.71;
 // What the scales of the velocities and of the map itself may be off by, relative: added to the
 // standard deviation.
 constexpr double kScaleError = 0.01;
 constexpr double kLeastChange = 0.002;  // of the scale, for which the map is rescaled
+// The error of the map's way between two keyframes, along each axis, as a share of its length: 0.5
+// to 1.7 % in the rendered flights 00 to 19.
+constexpr double kWayError = 0.015;
 // A way contradicts the velocities where it differs from theirs by more than this share, so many of
 // their standard deviations, taken as equal errors, and this share of the median depth, which is
 // the map's error. They are clear where they say this many standard deviations.
@@ -62,11 +69,13 @@ Ways ways_to(const Travel& travel, const Rigid& cam_from_world) {
   return ways;
 }
 
-void add_evidence(double product, double square, double variance, int32_t source,
-                  MetricScale* scale) {
-  scale->product += product / variance;
-  scale->square += square / variance;
-  scale->evidence |= source;
+// Adds `sign` times `way`, which is that of one way.
+void add_evidence(const ScaleEvidence& way, double sign, ScaleEvidence* evidence) {
+  evidence->product += sign * way.product;
+  evidence->square += sign * way.square;
+  evidence->noise += sign * way.noise;
+  evidence->total += sign * way.total;
+  evidence->num += sign * way.num;
 }
 
 // Adds `sign` times what the way from the keyframe before says of the segment's scale, by least
@@ -78,30 +87,58 @@ void add_way(Odometry* odometry, int32_t keyframe, double sign) {
   // In the camera's axes, the way back.
   const Rigid motion = motion_between(before.cam_from_world, own.cam_from_world);
   const double* back = motion.t;
+  const double square = length_sq_of(back), noise = kWayError * kWayError * square;
   if (own.way_variance > 0) {
-    add_evidence(-sign * dot(own.way_m, back), sign * length_sq_of(back), own.way_variance,
-                 TV_SCALE_VELOCITY, &odometry->scale);
+    const double weight = 1 / own.way_variance;
+    add_evidence({-weight * dot(own.way_m, back), weight * square, 3 * weight * noise,
+                  weight * length_sq_of(own.way_m), 3},
+                 sign, &odometry->scale.velocity);
   }
   if (odometry->is_upright && own.height_sigma_m > 0 && before.height_sigma_m > 0) {
     double in_world[3];
     rotate_back(own.cam_from_world.R, back, in_world);
-    const double climb = in_world[2];
-    add_evidence(
-        sign * (own.height_m - before.height_m) * climb, sign * climb * climb,
-        own.height_sigma_m * own.height_sigma_m + before.height_sigma_m * before.height_sigma_m,
-        TV_SCALE_HEIGHT, &odometry->scale);
+    const double climb = in_world[2], climb_m = own.height_m - before.height_m;
+    const double weight = 1 / (own.height_sigma_m * own.height_sigma_m +
+                               before.height_sigma_m * before.height_sigma_m);
+    add_evidence({weight * climb_m * climb, weight * climb * climb, weight * noise,
+                  weight * climb_m * climb_m, 1},
+                 sign, &odometry->scale.height);
   }
 }
 
-// Gives the segment the metre as its unit once the scale is known to a tenth.
+// Whether heights and velocities contradict each other by more than their standard deviations.
+bool is_contradicted(const MetricScale& known) {
+  const ScaleEstimate h = estimate_of(known.height, TV_SCALE_HEIGHT);
+  const ScaleEstimate v = estimate_of(known.velocity, TV_SCALE_VELOCITY);
+  if (h.source == TV_SCALE_UNIT || v.source == TV_SCALE_UNIT) return known.is_contradicted;
+  const double height = h.product / h.square, velocity = v.product / v.square;
+  const double difference = height - velocity;
+  const double variance = 1 / h.square + 1 / v.square +
+                          kScaleError * kScaleError * (height * height + velocity * velocity);
+  if (!known.is_contradicted) return difference * difference > kContradicted * variance;
+  // They agree where they could have contradicted each other: one that is twice the other.
+  const double larger = std::max(std::fabs(height), std::fabs(velocity));
+  return difference * difference > kAgreed * variance ||
+         4 * kContradicted * variance > larger * larger;
+}
+
+// Gives the segment the metre as its unit once the scale is known to a tenth, and follows it. Where
+// the sensors contradict each other nobody knows which one is wrong: there is no metre then, and
+// the unit stays what it was.
 void settle_scale(Odometry* odometry, Frame* frame) {
   MetricScale* known = &odometry->scale;
-  if (!(known->square > 0)) return;
-  const double variance = known->square / (known->product * known->product);  // relative
-  if (!(known->product > 0) || !(variance <= kLargestScaleSigma * kLargestScaleSigma)) return;
-  const double scale = known->product / known->square;
+  known->is_contradicted = is_contradicted(*known);
+  const ScaleEstimate now = estimate_of(*known);
+  const double most = known->source == TV_SCALE_UNIT ? kLargestScaleSigma : kLostScaleSigma;
+  const double variance = now.square / (now.product * now.product);  // relative
+  if (known->is_contradicted || !(now.product > 0) || !(variance <= most * most)) {
+    known->source = TV_SCALE_UNIT;
+    known->sigma = 0;
+    return;
+  }
+  const double scale = now.product / now.square;
   known->sigma = std::sqrt(variance + kScaleError * kScaleError);
-  known->source = known->evidence;
+  known->source = now.source;
   if (std::fabs(scale - 1) < kLeastChange) return;
   rescale(odometry, scale, frame);
   stretch_ways(odometry, scale);
@@ -145,9 +182,9 @@ bool is_contrary(const Odometry& odometry, const Frame& frame) {
   const Travel& travel = odometry.travel;
   if (!travel.is_known) return false;
   const Ways ways = ways_to(travel, frame.cam_from_world);
-  const MetricScale& known = odometry.scale;
+  const ScaleEstimate known = estimate_of(odometry.scale);
   double scale = 0;  // a way against the velocities fits none
-  if (known.source != TV_SCALE_UNIT)
+  if (odometry.scale.source != TV_SCALE_UNIT)
     scale = known.product / known.square;
   else if (ways.product > 0)
     scale = ways.product / ways.square;
@@ -211,17 +248,82 @@ bool is_reachable(const Odometry& odometry, const Frame& frame) {
 }
 
 void stretch_ways(Odometry* odometry, double factor) {
-  odometry->scale.product *= factor;
-  odometry->scale.square *= factor * factor;
+  for (ScaleEvidence* evidence : {&odometry->scale.height, &odometry->scale.velocity}) {
+    evidence->product *= factor;
+    evidence->square *= factor * factor;
+    evidence->noise *= factor * factor;
+  }
+}
+
+// The residuals' sum of squares is chi2. Where it is larger than their number, the sensor errs more
+// than it states, and in proportion: heights have the steps of the ground. Where velocities have
+// other directions than the map, as those that come late, the slope of their ways over the map's is
+// too small, but that of the map's over theirs too large: what lies between the two, beyond the
+// stated noise, is uncertain, too. So is by how much the map's own errors make the slope too small;
+// in level flight the map climbs by little else, and heights say nothing.
+ScaleEstimate estimate_of(const ScaleEvidence& evidence, int32_t source) {
+  if (!(evidence.num > 0 && evidence.square > 2 * evidence.noise)) return {};
+  const double slope = evidence.product / evidence.square;
+  const double chi2 = evidence.total - slope * evidence.product;
+  const double num = std::max(evidence.num - 1, 1.0);
+  const double more = std::max(chi2 - num, 0.0);
+  const double between = more > 0 && source == TV_SCALE_VELOCITY ? more / evidence.product : 0;
+  const double bias = slope * evidence.noise / (evidence.square - evidence.noise);
+  const double share = 1 / (1 + more / num + (between * between + bias * bias) * evidence.square);
+  if (!(share > 0)) return {};
+  return {source, share * evidence.product, share * evidence.square};
+}
+
+ScaleEstimate estimate_of(const MetricScale& scale) {
+  const ScaleEstimate a = estimate_of(scale.height, TV_SCALE_HEIGHT);
+  const ScaleEstimate b = estimate_of(scale.velocity, TV_SCALE_VELOCITY);
+  const int32_t source = a.source | b.source | scale.loaded;
+  return {source, a.product + b.product, a.square + b.square};
+}
+
+MetricScale scale_of(const ScaleEstimate& estimate, int32_t source, double sigma) {
+  MetricScale scale{};
+  scale.source = source;
+  scale.sigma = sigma;
+  if (!(estimate.square > 0)) return scale;
+  scale.loaded = estimate.source;
+  ScaleEvidence& of = estimate.source == TV_SCALE_HEIGHT ? scale.height : scale.velocity;
+  of.product = estimate.product;
+  of.square = estimate.square;
+  of.total = estimate.product / estimate.square * estimate.product;
+  of.num = 1;
+  return scale;
+}
+
+void join_scale(const MetricScale& other, double scale, Odometry* odometry) {
+  MetricScale* own = &odometry->scale;
+  const ScaleEvidence* from[2] = {&other.height, &other.velocity};
+  ScaleEvidence* to[2] = {&own->height, &own->velocity};
+  for (int k = 0; k < 2; ++k) {
+    ScaleEvidence more = *from[k];
+    more.product *= scale;
+    more.square *= scale * scale;
+    more.noise *= scale * scale;
+    add_evidence(more, 1, to[k]);
+  }
+  own->loaded |= other.loaded;
+  own->is_contradicted |= other.is_contradicted;
 }
 
 void change_scale(Odometry* odometry, int32_t from, int32_t to) {
   const bool is_known = odometry->other_segment == to;
-  if (is_known || odometry->scale.source != TV_SCALE_UNIT) {
+  const bool was_contradicted = odometry->scale.is_contradicted;
+  if (is_known || odometry->scale.source != TV_SCALE_UNIT || was_contradicted) {
     std::swap(odometry->scale, odometry->other_scale);
     odometry->other_segment = from;
   }
   if (!is_known) odometry->scale = MetricScale{};
+  // The sensors are the same ones.
+  if (was_contradicted) {
+    odometry->scale.is_contradicted = true;
+    odometry->scale.source = TV_SCALE_UNIT;
+    odometry->scale.sigma = 0;
+  }
   odometry->travel.keyframe_id = -1;  // its axes were those of the other segment
   odometry->num_contrary = 0;
 }

@@ -41,6 +41,22 @@ void add_ways(Odometry* odometry, double sign);
 // The segment's unit became 1 / factor of what it was.
 void stretch_ways(Odometry* odometry, double factor);
 
+// What the evidence says: product / square is the scale, and 1 / square its variance. Of all of it
+// together, `source` (tv_scale_source) names the sensors that it is of.
+struct ScaleEstimate {
+  int32_t source;
+  double product, square;
+};
+ScaleEstimate estimate_of(const ScaleEvidence& evidence, int32_t source);
+ScaleEstimate estimate_of(const MetricScale& scale);
+
+// The evidence that says this: as it is kept in a map's bytes, where a scale that was contradicted
+// leaves none.
+MetricScale scale_of(const ScaleEstimate& estimate, int32_t source, double sigma);
+
+// A segment, whose unit is `scale` of the tracked one's, became part of it.
+void join_scale(const MetricScale& other, double scale, Odometry* odometry);
+
 // What is known of the scale is kept, and what was known of the segment's is taken up.
 void change_scale(Odometry* odometry, int32_t from, int32_t to);
 

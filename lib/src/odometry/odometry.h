@@ -94,11 +94,20 @@ struct CameraEvidence {
   double information[3], product[2], square;
 };
 
-// The normal equation of the scale, metres per unit of the map: square scale = product.
-// Its numbers follow each other in a map's bytes.
+// What one kind of sensor says of the scale, metres per unit of the map: the normal equation square
+// scale = product of its ways' components beside the map's, the share of `square` that the errors
+// of the map's ways have, the sum of the squares of its own, all in units of its variances, and how
+// many components these are.
+struct ScaleEvidence {
+  double product, square, noise, total, num;
+};
+
 struct MetricScale {
-  int32_t source, evidence;  // tv_scale_source
-  double product, square, sigma;
+  int32_t source;        // tv_scale_source
+  int32_t loaded;        // the one of the evidence that a map's bytes brought
+  bool is_contradicted;  // heights and velocities contradict each other
+  ScaleEvidence height, velocity;
+  double sigma;  // relative; 0 where the source is TV_SCALE_UNIT
 };
 
 inline constexpr int32_t kCellPx = 16;

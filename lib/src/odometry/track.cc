@@ -174,7 +174,8 @@ bool heed_velocities(Odometry* odometry, const Frame& frame, uint32_t* reasons) 
   if (odometry->velocity_trust < kLeastTrust || ++odometry->num_contrary < kMostContrary)
     return true;
   odometry->velocity_trust -= odometry->velocity_trust / 4;
-  if (odometry->scale.source == TV_SCALE_UNIT) odometry->confirmed_id = -1;
+  if (odometry->scale.source == TV_SCALE_UNIT && !odometry->scale.is_contradicted)
+    odometry->confirmed_id = -1;
   remove_unconfirmed(odometry);
   return false;
 }
@@ -316,12 +317,14 @@ bool finish_tracked(Odometry* odometry, const PoseFit& fit, bool follows, bool g
   count_found(odometry, *frame);
   measure_depth(odometry, *frame);
   write_fit(fit, state);
+  const double seconds = frame->time_s - odometry->previous.time_s;
+  follows = follows && seconds > 0;  // else the clock began anew, and nobody knows how long it was
   odometry->has_motion = follows;
   if (follows) {
     odometry->motion = motion_between(odometry->previous.cam_from_world, frame->cam_from_world);
-    odometry->motion_s = frame->time_s - odometry->previous.time_s;
+    odometry->motion_s = seconds;
   }
-  if (follows && !(gap && odometry->motion_s > kLongestGap))
+  if (follows && !(gap && seconds > kLongestGap))
     add_travel(odometry, *frame);
   else
     begin_travel(odometry, frame->cam_from_world, -1);
@@ -423,6 +426,17 @@ __attribute__((noinline)) void write_counts(const Odometry& odometry, tv_odometr
   state->num_loops = odometry.num_loops;
   state->scale_source = odometry.scale.source;
   state->scale_sigma = odometry.scale.sigma;
+  state->scale_contradicted = odometry.scale.is_contradicted;
+  const ScaleEstimate h = estimate_of(odometry.scale.height, TV_SCALE_HEIGHT);
+  const ScaleEstimate v = estimate_of(odometry.scale.velocity, TV_SCALE_VELOCITY);
+  if (h.source != TV_SCALE_UNIT) {
+    state->height_scale = h.product / h.square;
+    state->height_scale_sigma = std::sqrt(1 / h.square);
+  }
+  if (v.source != TV_SCALE_UNIT) {
+    state->velocity_scale = v.product / v.square;
+    state->velocity_scale_sigma = std::sqrt(1 / v.square);
+  }
   state->principal_point_shift_px[0] = odometry.camera.model.cx - odometry.given_camera.cx;
   state->principal_point_shift_px[1] = odometry.camera.model.cy - odometry.given_camera.cy;
 }

@@ -204,6 +204,7 @@ void Flight::track_frame(SourceFrame frame) {
   if (state_.has_pose) {
     record.live_segment = state_.segment;
     record.live_metric = state_.scale_source != TV_SCALE_UNIT;
+    record.live_scale_sigma = state_.scale_sigma;
     record.live = pose_of(state_.world_from_cam_R, state_.world_from_cam_t);
     record.reference_id = state_.reference_id;
     record.reference_from_cam = pose_of(state_.reference_from_cam_R, state_.reference_from_cam_t);

@@ -34,6 +34,7 @@ struct FlightFrame {
   // As known when the frame was tracked; segment -1: no pose.
   int32_t live_segment = -1;
   bool live_metric = false;  // whether the map's unit was the metre then
+  double live_scale_sigma = 0;
   Pose live;
   int32_t reference_id = -1;
   Pose reference_from_cam;

@@ -152,6 +152,7 @@ void add_measurements(Folder& folder) {
   const std::string path = (fs::path(folder.path) / "imu.txt").string();
   if (!is_file(path)) return;
   folder.measurements = Measurements::read(path);
+  folder.note = folder.measurements->note();
   folder.files.push_back(path);
 }
 

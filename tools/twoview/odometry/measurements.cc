@@ -15,6 +15,8 @@ constexpr size_t kMaxFileBytes = 1 << 28;
 constexpr double kGapS = 0.25;   // longest time between two samples that are interpolated
 constexpr double kSameS = 1e-6;  // a sample at the time of the frame, as times are written
 constexpr size_t kNumbers = 12;  // a sample
+// What no drone has, as in the drivers: such a number is no measurement.
+constexpr double kMostHeightM = 3000, kMostSpeedMS = 150;
 
 // The numbers of words[first..], in which "nan" means "not measured".
 std::vector<double> numbers_of(const std::vector<std::string_view>& words, size_t first,
@@ -76,11 +78,15 @@ Measurements::Sample Measurements::sample_of(const std::vector<double>& n,
     sample.world_from_body = {n[2], n[3], n[4], n[1]};
     sample.attitude_sigma_rad = n[5];
   }
-  if (is_known(n, 6, 7)) {
+  if (is_known(n, 6, 7) && !(std::abs(n[6]) <= kMostHeightM)) {
+    ++num_impossible_heights_;
+  } else if (is_known(n, 6, 7)) {
     sample.height_m = n[6];
     sample.height_sigma_m = n[7];
   }
-  if (is_known(n, 8, 11)) {
+  if (is_known(n, 8, 11) && !(std::hypot(n[8], n[9], n[10]) <= kMostSpeedMS)) {
+    ++num_impossible_velocities_;
+  } else if (is_known(n, 8, 11)) {
     sample.velocity_m_s = {n[8], n[9], n[10]};
     sample.velocity_sigma_m_s = n[11];
   }
@@ -90,6 +96,7 @@ Measurements::Sample Measurements::sample_of(const std::vector<double>& n,
 Measurements Measurements::read(const std::string& file) {
   const std::string text = read_file(file, kMaxFileBytes);
   Measurements found;
+  found.file_ = file;
   bool has_mount = false;
   for (const TextLine& line : lines_of(text)) {
     const std::string where = file + ": line " + std::to_string(line.number);
@@ -103,13 +110,21 @@ Measurements Measurements::read(const std::string& file) {
       has_mount = true;
       continue;
     }
-    const Sample sample = sample_of(numbers_of(words, 0, where), where);
+    const Sample sample = found.sample_of(numbers_of(words, 0, where), where);
     if (!found.samples_.empty() && !(sample.time_s > found.samples_.back().time_s))
       throw BadInput(where + ": its time is not later than that of the line before");
     found.samples_.push_back(sample);
   }
   if (!has_mount) throw BadInput(file + ": no line body_from_cam in it");
   return found;
+}
+
+std::string Measurements::note() const {
+  if (num_impossible_heights_ + num_impossible_velocities_ == 0) return {};
+  return file_ + ": of " + std::to_string(samples_.size()) + " samples " +
+         std::to_string(num_impossible_heights_) + " heights above 3000 m and " +
+         std::to_string(num_impossible_velocities_) +
+         " velocities above 150 m/s were left out: are they in metres?";
 }
 
 void Measurements::add_to(SourceFrame& frame) const {

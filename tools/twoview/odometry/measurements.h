@@ -12,13 +12,17 @@ namespace cli {
 
 class Measurements {
  public:
-  // Reads the file. Throws BadInput that names the line.
+  // Reads the file. Throws BadInput that names the line. A height or a velocity that no drone has
+  // (above 3000 m, 150 m/s) is none that was measured.
   static Measurements read(const std::string& file);
 
   // Adds what was measured at the frame's time, in the camera's terms, between the two samples
   // around it. A quantity that one of the two does not have, or two samples more than 0.25 s apart,
   // add nothing.
   void add_to(SourceFrame& frame) const;
+
+  // What is to be said of the file; empty where nothing is.
+  std::string note() const;
 
  private:
   struct Sample {
@@ -30,10 +34,12 @@ class Measurements {
     Vector3 velocity_m_s{};  // along the axes of the body
     double velocity_sigma_m_s = 0;
   };
-  static Sample sample_of(const std::vector<double>& numbers, const std::string& where);
+  Sample sample_of(const std::vector<double>& numbers, const std::string& where);
 
   Matrix3 body_from_camera_{};
   std::vector<Sample> samples_;  // sorted by time
+  std::string file_;
+  int num_impossible_heights_ = 0, num_impossible_velocities_ = 0;
 };
 
 }  // namespace cli

@@ -251,6 +251,15 @@ std::string summary(const FlightResult& result, const FrameSource& source, const
                          100 * j["scale_sigma"].get<double>());
   else
     text += summary_line("length", "%.3f times the distance of the first two keyframes", length);
+  if (const auto& both = j["scale_contradiction"]; both.is_object()) {
+    const auto& h = both["height"];
+    const auto& v = both["velocity"];
+    text += summary_line("metre",
+                         "none: heights and velocities contradict each other: a unit of the map is "
+                         "%.4g m (sigma %.2g) by heights, %.4g m (%.2g) by velocities",
+                         h["scale"].get<double>(), h["sigma"].get<double>(),
+                         v["scale"].get<double>(), v["sigma"].get<double>());
+  }
   if (j["truth"].is_object()) text += truth_line(j["truth"]);
   if (j["time_ms"]["mean"].is_number())
     text += summary_line(

@@ -167,6 +167,24 @@ std::string colmap_cameras(const tv_camera& c) {
   return text + "\n";
 }
 
+// The standard deviation of the longest segment's scale, as its last frame that was tracked in it
+// said: the segment that the film ends in may be another one. 0: its unit is not the metre, or the
+// sensors have contradicted each other since.
+double scale_sigma_of(const FlightResult& result) {
+  if (result.flight->state().scale_contradicted != 0) return 0;
+  double sigma = 0;
+  for (const FlightFrame& frame : result.flight->frames())
+    if (frame.live_segment >= 0 && frame.segment == result.segment) sigma = frame.live_scale_sigma;
+  return sigma;
+}
+
+// The metres of one unit of the map by each sensor, where the two contradict each other; else null.
+Json scale_contradiction(const tv_odometry_state& state) {
+  if (state.scale_contradicted == 0) return nullptr;
+  return {{"height", {{"scale", state.height_scale}, {"sigma", state.height_scale_sigma}}},
+          {"velocity", {{"scale", state.velocity_scale}, {"sigma", state.velocity_scale_sigma}}}};
+}
+
 }  // namespace
 
 Trajectory trajectory_of(const Flight& flight, int32_t segment) {
@@ -217,7 +235,8 @@ Json flight_json(const FlightResult& result) {
     num_located += frame.origin == PoseOrigin::kLocated;
     num_ignored += frame.attitude_ignored;
   }
-  const bool is_metric = state.scale_source != TV_SCALE_UNIT;
+  const double scale_sigma = scale_sigma_of(result);
+  const bool is_metric = scale_sigma > 0;
   Json json;
   json["num_frames"] = flight.frames().size();
   json["num_tracked"] = num_tracked;
@@ -235,7 +254,8 @@ Json flight_json(const FlightResult& result) {
     json["status_counts"][tv_odometry_status_string(static_cast<tv_odometry_status>(s))] =
         counts[s];
   json["scale"] = is_metric ? "metric" : "unit";
-  json["scale_sigma"] = is_metric ? Json(state.scale_sigma) : Json(nullptr);
+  json["scale_sigma"] = is_metric ? Json(scale_sigma) : Json(nullptr);
+  json["scale_contradiction"] = scale_contradiction(state);
   if (flight.has_corrected_camera())
     json["principal_point_shift_px"] = state.principal_point_shift_px;
   else
