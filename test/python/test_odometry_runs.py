@@ -15,7 +15,7 @@ import numpy as np
 from twoview_tools import formats
 from twoview_tools.accuracy import datasets
 from twoview_tools.odometry import (cli, copies, endurance, evaluate, faults, flights, mapper,
-                                    poses, set_writer, sets, surfaces, targets)
+                                    poses, sensors, set_writer, sets, surfaces, targets)
 
 LIBRARY = os.environ.get("TWOVIEW_LIBRARY", "")
 BUILT = os.path.join(os.path.dirname(os.path.dirname(LIBRARY)), "bin", "twoview_flights")
@@ -239,6 +239,24 @@ class Faults(Folder):
         with self.assertRaisesRegex(ValueError, "no copy 'fire'"):
             copies.make("fire", self.source, self.path("x"))
 
+    def test_a_fault_of_sensors_changes_its_columns_only(self):
+        with open(self.path("source", "imu.txt"), "w", encoding="ascii") as file:
+            file.write("# a comment\nbody_from_cam 1 0 0 0\n")
+            for k in range(40):
+                file.write(f"{0.1 * k} 1 0 0 0 0.01 {1 + 0.1 * k} 0.02 {0.5 * k} 0 1 0.05\n")
+        before = np.loadtxt(self.path("source", "imu.txt"), skiprows=2)
+        for kind in sensors.KINDS:
+            folder = sensors.make(kind, self.source, self.path("sensors", kind))
+            after = np.loadtxt(os.path.join(folder, "imu.txt"), skiprows=1)
+            changed = sorted(set(np.nonzero(np.abs(after - before) > 1e-8)[1]))
+            self.assertTrue(set(changed) <= ({6} if "height" in kind else {8, 10}), kind)
+            self.assertEqual(not changed, kind == "none")
+            self.assertEqual(sets.read_set(folder).names, sets.read_set(self.source).names)
+        after = np.loadtxt(self.path("sensors", "velocity_late", "imu.txt"), skiprows=1)
+        np.testing.assert_allclose(after[3:, 8], before[:-3, 8], atol=1e-8)
+        with self.assertRaises(ValueError):
+            sensors.make("height_furlongs", self.source, self.path("sensors", "x"))
+
     def test_an_unknown_fault_is_refused(self):
         with self.assertRaisesRegex(ValueError, "no fault 'fire'"):
             faults.inject("fire", self.source, self.path("x"))
@@ -387,6 +405,17 @@ class Targets(unittest.TestCase):
                                   (run(None, 26.0), True, False)):
             found = [reached for reached, text in targets.judge([small, last]) if " ms" in text]
             self.assertEqual(found, [mean, every])
+
+    def test_a_metre_that_is_off_is_judged_by_its_sigma(self):
+        def judged(ratio, kind, scale="metric"):
+            run = {"label": f"flight_00+{kind}", "set": "flight_00", "kind": "sensors",
+                   "num_segments": 1, "scale": scale, "scale_sigma": 0.01,
+                   "truth": {"scale_ratio": ratio, "ate_rmse": 0.1, "coverage": 1}}
+            return [reached for reached, text in targets.judge([run]) if "sigmas: " in text]
+        self.assertEqual(judged(1.02, "height_mm"), [True])
+        self.assertEqual(judged(1.04, "height_mm"), [False])
+        self.assertEqual(judged(2, "velocity_double", "unit"), [True])
+        self.assertEqual(judged(0.96, "none"), [False])
 
     def test_the_worst_seed_counts(self):
         runs = [{"label": "seq_tsukuba", "set": "seq_tsukuba", "kind": "set", "num_segments": 1,

@@ -10,7 +10,7 @@ import tempfile
 
 from .. import ROOT
 from . import (copies, endurance, evaluate, faults, flights, instructions, mapper, orbslam, poses,
-               runs, sets, tables, targets, tour)
+               runs, sensors, sets, tables, targets, tour)
 
 FLIGHT_FOLDER = os.path.join(ROOT, ".cache", "flights")
 # The sources that faults are put into: one real and quick, one rendered; and what other_room shows.
@@ -33,6 +33,9 @@ def arguments_of(argv):
                              "a person, in two sources, and a flight with half a turn")
     parser.add_argument("--fault-sources", metavar="FOLDERS",
                         help="put the faults into these sets or folders, separated by commas")
+    parser.add_argument("--sensors", type=int, default=0, metavar="N",
+                        help="the flights of the seeds 0 to N-1 with heights or velocities of "
+                             f"another unit, sign or time: {', '.join(sensors.KINDS)}")
     parser.add_argument("--peers", action="store_true", help="ORB-SLAM3 over the same sources")
     parser.add_argument("--json", metavar="FILE", help="write every figure")
     parser.add_argument("--program", help="the program twoview (default: the release build's)")
@@ -77,6 +80,13 @@ def sources_of(arguments, scratch):
         name = f"half_turn_{seed:02d}"
         yield "fault", name, flights.render(seed, os.path.join(FLIGHT_FOLDER, name),
                                             ["--half-turn"])
+    for seed in range(arguments.sensors):
+        name = f"flight_{seed:02d}"
+        flight = flights.render(seed, os.path.join(FLIGHT_FOLDER, name))
+        for kind in sensors.KINDS:
+            label = f"{name}+{kind}"
+            yield "sensors", label, sensors.make(kind, flight,
+                                                 os.path.join(scratch, "sensors", label))
     if not (arguments.faults or arguments.fault_sources):
         return
     chosen = sets.set_paths(arguments.fault_sources or FAULT_SET)

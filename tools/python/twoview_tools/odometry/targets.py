@@ -3,6 +3,8 @@ measured)."""
 
 import numpy as np
 
+from . import sensors
+
 # Per set: (ATE in metres or None, ATE in per cent of the path or None, coverage at least).
 SETS = {"seq_chessboard_desk": (0.01, None, 0.90), "seq_tum_fr1_rpy": (0.04, None, 0.90),
         "seq_parking": (0.40, None, 0.99), "seq_kitti00_first200": (0.8, None, 0.99),
@@ -89,6 +91,19 @@ def _flights(runs):
                 lambda run: run["map"]["outlier_percent"], MAP_OUTLIER_PERCENT)
 
 
+def _sensors(runs):
+    for is_sound, what in ((False, "contradicting sensors"), (True, "sound sensors")):
+        own = [run for run in runs if run["kind"] == "sensors" and
+               run["label"].split(" ")[0].endswith("+none") == is_sound]
+        if not own:
+            continue
+        metric = [run for run in own if run.get("scale") == "metric"]
+        wrong = [run["label"] for run in own if not sensors.is_honest(run)]
+        yield not wrong, (f"{what}: never metric with a scale off by more than 3 sigmas: "
+                          f"{len(own) - len(wrong)} of {len(own)}, {len(metric)} of them metric"
+                          + (f"; not {', '.join(wrong)}" if wrong else ""))
+
+
 def _honesty(runs):
     for kinds, what in ((("set", "flight"), "sets and flights"), (("copy",), "changed copies"),
                         (("fault",), "injected faults")):
@@ -156,5 +171,5 @@ def _against_peer(runs, peers):
 def judge(runs, peers=()):
     """[(True, False or None; sentence)] of the runs (evaluate.evaluate's figures with `label` and
     `kind` "set", "copy", "flight" or "fault") and of a peer's runs over the same sources."""
-    return [*_sets(runs), *_flights(runs), *_honesty(runs), *_cost(runs),
+    return [*_sets(runs), *_flights(runs), *_sensors(runs), *_honesty(runs), *_cost(runs),
             *_against_peer(runs, peers)]
