@@ -20,7 +20,8 @@ from ._abi import (CORRESPONDENCE, DENSE_POINT, DESCRIPTOR_BYTES, DISTANCE_PRIOR
                    TV_ERR_CAMERA, TV_ERR_CAPACITY, TV_ERR_KERNELS, TV_ERR_LIMITS, TV_ERR_MAP,
                    TV_ERR_MEMORY,
                    TV_ERR_NOT_FINITE, TV_ERR_NULL, TV_ERR_OUTSIDE, TV_ERR_OVERLAP,
-                   TV_ERR_STRIDE, TV_ERR_STRUCT_SIZE, TV_ERR_TIME, WINDOW_VIEW, Library, StatusError, default_library)
+                   TV_ERR_STRIDE, TV_ERR_STRUCT_SIZE, TV_ERR_TIME, WINDOW_VIEW, Library,
+                   StatusError, default_library)
 from .absolute_pose import AbsolutePose, estimate_absolute_pose
 from .camera import (Camera, camera_check, camera_project_points, camera_scale,
                      camera_undistort, camera_unproject_points, camera_valid_angle)
@@ -77,7 +78,8 @@ __all__ = [
     "RoomState", "ScaleSource", "Solver", "Stage", "Status", "StatusError", "TV_ERR_ALIGNMENT",
     "TV_ERR_ARGUMENT", "TV_ERR_CAMERA", "TV_ERR_CAPACITY", "TV_ERR_KERNELS", "TV_ERR_LIMITS",
     "TV_ERR_MAP", "TV_ERR_MEMORY", "TV_ERR_NOT_FINITE", "TV_ERR_NULL", "TV_ERR_OUTSIDE",
-    "TV_ERR_OVERLAP", "TV_ERR_STRIDE", "TV_ERR_STRUCT_SIZE", "TV_ERR_TIME", "Triangulation", "TwoView", "Verdict",
+    "TV_ERR_OVERLAP", "TV_ERR_STRIDE", "TV_ERR_STRUCT_SIZE", "TV_ERR_TIME", "Triangulation",
+    "TwoView", "Verdict",
     "WINDOW_VIEW", "WindowOptions", "WindowResult", "adjust_two_view", "adjust_window",
     "align_matches", "camera_check", "camera_project_points", "camera_scale",
     "camera_undistort", "camera_unproject_points", "camera_valid_angle", "correct_matches",
