@@ -123,6 +123,43 @@ def test_bad_input_is_refused(frames):
         tv.Odometry(CAMERA, keypoints=5)
 
 
+def test_a_mask_leaves_a_part_of_the_frames_out(frames):
+    mask = np.ones((HEIGHT, WIDTH), bool)
+    mask[:, 220:] = False
+    with tv.Odometry(CAMERA, max_keypoints=800) as odometry:
+        states = [odometry.track(frame, i / 30, mask=mask) for i, frame in enumerate(frames)]
+        assert states[-1].status == tv.OdometryStatus.TRACKING
+        assert odometry.last_frame()["x"].max() < 221
+        assert odometry.still_mask().all() and states[-1].still_share == 0
+        with pytest.raises(ValueError, match="mask"):
+            odometry.track(frames[0], 9.0, mask=mask[:100])
+
+
+def test_text_that_stands_still_is_left_out():
+    """The camera turns by 0.015 radians a frame as it flies past, with text over its picture."""
+    random = np.random.default_rng(3)
+    wide = np.kron(random.integers(0, 256, (HEIGHT // 4 + 30, WIDTH)), np.ones((4, 4)))
+    lines = np.kron(random.integers(0, 2, (5, 4, 12)), np.ones((1, 5, 5))).astype(np.uint8) * 255
+    x, y = np.meshgrid(np.arange(WIDTH) - CAMERA.cx, np.arange(HEIGHT) - CAMERA.cy)
+    with tv.Odometry(CAMERA) as odometry:
+        for i in range(12):
+            c, s = np.cos(0.015 * i), np.sin(0.015 * i)
+            # Where the camera saw the ray before it turned, and so the wall and its depth.
+            z = c - s * x / FOCAL
+            at_x, at_y = (c * x + s * FOCAL) / z + CAMERA.cx, y / z + CAMERA.cy
+            band = np.clip(at_y * len(DEPTHS) // HEIGHT, 0, len(DEPTHS) - 1).astype(int)
+            shift = FOCAL * STEP * i / np.array(DEPTHS)[band]
+            frame = wide[np.rint(at_y + 40).astype(int), np.rint(at_x + 60 + shift).astype(int)]
+            frame = frame.astype(np.uint8)
+            for top, line in zip(range(10, HEIGHT, 50), lines):
+                frame[top:top + 20, 20:80] = line
+            state = odometry.track(frame, i / 30)
+        left_out = ~odometry.still_mask()
+    assert 0.01 < state.still_share < 0.2
+    assert left_out.mean() == pytest.approx(state.still_share)
+    assert not left_out[:, 110:].any()
+
+
 def test_a_map_is_added(flight):
     odometry, states = flight
     data = odometry.save()

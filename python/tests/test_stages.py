@@ -29,6 +29,9 @@ def test_a_mask_keeps_corners_out(context, image):
     mask[:, 160:] = 255
     keypoints = tv.detect(context, image, mask, max_keypoints=500)
     assert len(keypoints) > 20 and keypoints["x"].min() > 155
+    assert np.array_equal(tv.detect(context, image, mask > 0, max_keypoints=500), keypoints)
+    by_bool, _ = tv.extract(context, image, mask > 0, max_keypoints=500)
+    assert by_bool["x"].min() > 155
 
 
 def test_rows_may_lie_apart_and_are_not_copied(context, image):

@@ -106,7 +106,7 @@ class tv_two_view(Structure):
                 ("principal_point_asked_px", c_double * 2),
                 ("principal_point_asked_covariance", c_double * 3),
                 ("probability_wrong", c_double), ("agreement", c_double),
-                ("region_shift_rad", c_double), ("num_places", c_int32), ("reserved", c_int32),
+                ("region_shift_rad", c_double), ("num_places", c_int32), ("num_still", c_int32),
                 ("focal_scale", c_double), ("focal_sigma", c_double)]
 
 
@@ -232,7 +232,7 @@ class tv_odometry_frame(Structure):
                 ("time_s", c_double), ("world_from_cam", c_double * 9),
                 ("attitude_sigma_rad", c_double), ("height_m", c_double),
                 ("height_sigma_m", c_double), ("velocity_m_s", c_double * 3),
-                ("velocity_sigma_m_s", c_double)]
+                ("velocity_sigma_m_s", c_double), ("mask", tv_image)]
 
 
 class tv_odometry_state(Structure):
@@ -250,7 +250,7 @@ class tv_odometry_state(Structure):
                 ("scale_contradicted", c_int32), ("scale_sigma", c_double),
                 ("principal_point_shift_px", c_double * 2), ("height_scale", c_double),
                 ("height_scale_sigma", c_double), ("velocity_scale", c_double),
-                ("velocity_scale_sigma", c_double)]
+                ("velocity_scale_sigma", c_double), ("still_share", c_double)]
 
 
 class tv_keyframe(Structure):
@@ -586,3 +586,13 @@ def check_image(name: str, pixels: Any) -> tv_image:
         raise ValueError(f"{name}: rows that overlap or run upwards")
     return tv_image(pixels.ctypes.data, pixels.shape[1], pixels.shape[0],
                     max(pixels.strides[0], pixels.shape[1]))
+
+
+def check_mask(name: str, mask: Any, image: np.ndarray) -> tv_image:
+    """A view of a mask of the image's shape, uint8 or bool, without a copy."""
+    if isinstance(mask, np.ndarray) and mask.dtype == np.bool_:
+        mask = mask.view(np.uint8)
+    view = check_image(name, mask)
+    if mask.shape != image.shape:
+        raise ValueError(f"{name}: the image's shape {image.shape} is expected, not {mask.shape}")
+    return view

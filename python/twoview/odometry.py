@@ -48,6 +48,7 @@ class OdometryState:
     scale_contradicted: bool  #: heights and velocities contradict each other: there is no metre
     height_scale: Optional[tuple[float, float]]  #: metres per unit, and sigma, by heights alone
     velocity_scale: Optional[tuple[float, float]]  #: the same by velocities alone
+    still_share: float  #: of the picture: stands still while the scene moves, and is left out
 
 
 @dataclass(frozen=True)
@@ -116,19 +117,23 @@ class Odometry:
               world_from_cam: Optional[np.ndarray] = None, attitude_sigma_rad: float = 0.0,
               height_m: float = 0.0, height_sigma_m: float = 0.0,
               velocity_m_s: Any = (0.0, 0.0, 0.0),
-              velocity_sigma_m_s: float = 0.0) -> OdometryState:
+              velocity_sigma_m_s: float = 0.0,
+              mask: Optional[np.ndarray] = None) -> OdometryState:
         """tv_odometry_track: tracks a frame, and extends and adjusts the map.
 
         image: (height, width) uint8, of the camera's size. time_s: later than that of the frame
         before; with gap any time. gap: frames are missing before this one, or the stream began
         anew. world_from_cam: (3, 3), the vehicle's
         attitude in a world whose z axis points down. Measurements with a sigma of 0 do not
-        exist."""
+        exist. mask: None, or uint8 or bool of the image's shape, 0 where the picture is left
+        out."""
         frame = self.library.make(_abi.tv_odometry_frame, {
             "gap": int(gap), "time_s": time_s, "attitude_sigma_rad": attitude_sigma_rad,
             "height_m": height_m, "height_sigma_m": height_sigma_m, "velocity_m_s": velocity_m_s,
             "velocity_sigma_m_s": velocity_sigma_m_s})
         frame.image = _abi.check_image("image", image)
+        if mask is not None:
+            frame.mask = _abi.check_mask("mask", mask, image)
         if world_from_cam is not None:
             R = _abi.small_array("world_from_cam", world_from_cam, 3, 3)
             frame.world_from_cam[:] = R.ravel().tolist()
@@ -143,6 +148,13 @@ class Odometry:
         struct = _abi.tv_camera()
         self._call("tv_odometry_camera", byref(struct))
         return replace(self._given_camera, cx=struct.cx, cy=struct.cy)
+
+    def still_mask(self) -> np.ndarray:
+        """tv_odometry_still_mask: (height, width) bool, False where the picture was found to stand
+        still while the scene moves, and is left out."""
+        mask = np.empty((self._given_camera.height, self._given_camera.width), np.uint8)
+        self._call("tv_odometry_still_mask", _abi.pointer(mask), c_size_t(mask.size))
+        return mask.astype(np.bool_)
 
     def finish(self) -> None:
         """tv_odometry_finish: does what tracking left for the frames to come. To be called after
@@ -244,4 +256,5 @@ def _state(s: Any) -> OdometryState:
         s.scale_sigma if scale != ScaleSource.UNIT else None,
         _matrix(s.principal_point_shift_px, 2), bool(s.scale_contradicted),
         (s.height_scale, s.height_scale_sigma) if s.height_scale_sigma > 0 else None,
-        (s.velocity_scale, s.velocity_scale_sigma) if s.velocity_scale_sigma > 0 else None)
+        (s.velocity_scale, s.velocity_scale_sigma) if s.velocity_scale_sigma > 0 else None,
+        s.still_share)

@@ -22,9 +22,7 @@ from .options import (BundleOptions, EstimateOptions, FeatureOptions, GuidedOpti
 def _images(image: np.ndarray, mask: Optional[np.ndarray]) -> list[Any]:
     views = [byref(_abi.check_image("image", image)), None]
     if mask is not None:
-        views[1] = byref(_abi.check_image("mask", mask))
-        if mask.shape != image.shape:
-            raise ValueError(f"mask: the image's shape {image.shape} is expected, not {mask.shape}")
+        views[1] = byref(_abi.check_mask("mask", mask, image))
     return views
 
 
@@ -38,8 +36,8 @@ def detect(context: Context, image: np.ndarray, mask: Optional[np.ndarray] = Non
     """tv_detect: FAST corners, strongest first.
 
     context: as large as the image. image: (height, width) uint8; the rows need not be adjacent.
-    mask: None, or uint8 of the same shape, 0 where no corner is wanted. options: a FeatureOptions,
-    or its fields as keywords.
+    mask: None, or uint8 or bool of the same shape, 0 where no corner is wanted. options: a
+    FeatureOptions, or its fields as keywords.
     Returns (n,) of twoview.KEYPOINT: x, y (pixels), size (pixels), angle_rad, score (grey levels),
     level.
     Raises TypeError or ValueError for an array that C could not read, TV_ERR_LIMITS for an image or
@@ -92,8 +90,9 @@ def extract(context: Context, image: np.ndarray, mask: Optional[np.ndarray] = No
             **keywords: Any) -> tuple[np.ndarray, np.ndarray]:
     """tv_extract: keypoints and descriptors, the same as from detect, orient and describe.
 
-    context: as large as the image. image: (height, width) uint8. mask: None, or uint8 of the same
-    shape, 0 where no corner is wanted. options: a FeatureOptions, or its fields as keywords.
+    context: as large as the image. image: (height, width) uint8. mask: None, or uint8 or bool
+    of the same shape, 0 where no corner is wanted. options: a FeatureOptions, or its fields as
+    keywords.
     Returns keypoints (n,) of twoview.KEYPOINT and descriptors (n, 128) uint8.
     Raises as detect does."""
     wanted = to_struct(check_context(context).library, FeatureOptions, options, keywords)
@@ -303,6 +302,7 @@ class TwoView(Record):
     #: how far the rotation turns without the inliers of the image region that turns it most
     region_shift_rad: float
     num_places: int  #: cells of 32 pixels with an inlier, in the image with fewer of them
+    num_still: int  #: matches that keep their pixel where no point of the scene can: left out
     #: What fx and fy are multiplied by, where the focal length was refined with the pose; all
     #: results then refer to the cameras with it. 0: as given.
     focal_scale: float
@@ -359,8 +359,8 @@ def _two_view(found: Any) -> TwoView:
         found.median_parallax_rad, found.rms_error_px, found.noise_px, found.seed,
         np.array(found.principal_point_shift), found.principal_point_chi2 if asked else None,
         matrix("principal_point_asked_px", asked, 2), covariance, found.probability_wrong,
-        found.agreement, found.region_shift_rad, found.num_places, found.focal_scale,
-        found.focal_sigma)
+        found.agreement, found.region_shift_rad, found.num_places, found.num_still,
+        found.focal_scale, found.focal_sigma)
 
 
 def corrected_camera(found: TwoView, camera: Camera) -> Camera:
@@ -587,12 +587,12 @@ def reconstruct(context: Context, image0: np.ndarray, camera0: Optional[Camera],
 
     context: as large as both images. image0, image1: (height, width) uint8, read without a copy.
     camera0, camera1: a Camera of each image's size; or None for both, which finds the fundamental
-    matrix F or a homography H, and no pose or points. mask0, mask1: None, or uint8 of the image's
-    shape, 0 where no corner is wanted. feature, match, estimate: the options of the stages, None
-    for the defaults. triangulation: a Triangulation. guided_matching: whether a second matching
-    follows along the epipolar lines. bundle_adjustment: whether pose and points are adjusted
-    together. sigma_by_size: the exponent of keypoint_sigmas, [0, 2]. align_matches: whether one
-    keypoint of each match is moved by the pixels around both.
+    matrix F or a homography H, and no pose or points. mask0, mask1: None, or uint8 or bool of the
+    image's shape, 0 where no corner is wanted. feature, match, estimate: the options of the stages,
+    None for the defaults. triangulation: a Triangulation. guided_matching: whether a second
+    matching follows along the epipolar lines. bundle_adjustment: whether pose and points are
+    adjusted together. sigma_by_size: the exponent of keypoint_sigmas, [0, 2]. align_matches:
+    whether one keypoint of each match is moved by the pixels around both.
     Returns a TwoView and a Reconstruction. "No geometry" is a result, not an exception: see
     TwoView.verdict.
     Raises TypeError or ValueError for an array that C could not read and for one camera alone,
@@ -633,7 +633,7 @@ def _reconstruct(context: Context, image0: np.ndarray, camera0: Optional[Camera]
                     f"{lens.width}x{lens.height}: resize the image, or its camera by "
                     "twoview.camera_scale")
         if mask is not None:
-            kept.append(_abi.check_image("mask" + name, mask))
+            kept.append(_abi.check_mask("mask" + name, mask, image))
             view.mask = ctypes.addressof(kept[-1])
         views.append(view)
     found = library.make(_abi.tv_two_view)

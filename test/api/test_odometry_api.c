@@ -1,6 +1,7 @@
 /* Tests of the odometry: the statuses and outputs that odometry.h promises, its accessors, and the
    bytes of its map. It flies through a small room that support/room_scene.h draws. */
 #include <math.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -236,6 +237,10 @@ static void test_bad_frames_are_refused(void) {
   frame.time_s = NAN, expect_refused(TV_ERR_NOT_FINITE), frame = good;
   frame.time_s = INFINITY, expect_refused(TV_ERR_NOT_FINITE), frame = good;
   frame.image.data = (const uint8_t *)&state, expect_refused(TV_ERR_OVERLAP), frame = good;
+  frame.mask = good.image, frame.mask.width -= 1, expect_refused(TV_ERR_ARGUMENT), frame = good;
+  frame.mask = good.image, frame.mask.stride_bytes = 3, expect_refused(TV_ERR_ARGUMENT);
+  frame.mask = good.image, frame.mask.data = (const uint8_t *)&state;
+  expect_refused(TV_ERR_OVERLAP), frame = good;
 }
 
 static void test_wrong_sensors_are_left_out_of_account(void) {
@@ -776,6 +781,59 @@ static void test_the_camera_is_reported(void) {
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_camera(odometry, NULL));
 }
 
+/* A mask that leaves the right part of the picture out, from this column on. */
+static uint8_t used_pixels[ROOM_WIDTH * ROOM_HEIGHT];
+static void make_mask(int edge, tv_image *mask) {
+  int k;
+  for (k = 0; k < ROOM_WIDTH * ROOM_HEIGHT; ++k) used_pixels[k] = k % ROOM_WIDTH < edge;
+  *mask = api_image(used_pixels, ROOM_WIDTH, ROOM_HEIGHT, ROOM_WIDTH);
+}
+
+static void test_no_keypoint_is_taken_where_the_mask_is_0(void) {
+  const int edge = 270;
+  int32_t num, k, n;
+  make_mask(edge, &frame.mask);
+  for (n = 0; n < 12 || (!state.has_pose && n < MOST_FRAMES); ++n) {
+    TEST_ASSERT_EQUAL_INT(TV_OK, give(odometry, n));
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_last_frame(odometry, observations, KEYPOINTS, &num));
+    TEST_ASSERT_EQUAL_INT32(KEYPOINTS, num);
+    for (k = 0; k < num; ++k) TEST_ASSERT_TRUE(observations[k].x < edge + 0.5f);
+  }
+  TEST_ASSERT_TRUE(state.has_pose);
+}
+
+static void test_a_mask_without_0_and_the_frame_of_an_older_header_change_nothing(void) {
+  size_t num;
+  fly(odometry, 4);
+  save(odometry, map, &num_map);
+  make_mask(ROOM_WIDTH, &frame.mask);
+  begin(1, &other);
+  fly(other, 4);
+  save(other, again, &num);
+  TEST_ASSERT_EQUAL_UINT64(num_map, num);
+  TEST_ASSERT_EQUAL_MEMORY(map, again, num);
+  frame.mask.data = NULL, frame.mask.stride_bytes = 1; /* not read */
+  frame.struct_size = offsetof(tv_odometry_frame, mask);
+  begin(1, &other);
+  fly(other, 4);
+  save(other, again, &num);
+  TEST_ASSERT_EQUAL_UINT64(num_map, num);
+  TEST_ASSERT_EQUAL_MEMORY(map, again, num);
+}
+
+static void test_what_stands_still_is_reported_as_a_mask(void) {
+  int k;
+  fly(odometry, 4);
+  TEST_ASSERT_TRUE(state.still_share == 0);
+  memset(used_pixels, 7, sizeof used_pixels);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_still_mask(odometry, used_pixels, sizeof used_pixels));
+  for (k = 0; k < ROOM_WIDTH * ROOM_HEIGHT; ++k) TEST_ASSERT_EQUAL_UINT8(255, used_pixels[k]);
+  TEST_ASSERT_EQUAL_INT(TV_ERR_CAPACITY,
+                        tv_odometry_still_mask(odometry, used_pixels, sizeof used_pixels - 1));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_still_mask(odometry, NULL, sizeof used_pixels));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_still_mask(NULL, used_pixels, sizeof used_pixels));
+}
+
 static void test_the_clock_is_read(void) {
   uint64_t calls = 0, before, times[TV_NUM_STAGES];
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_set_clock(NULL, count_calls, &calls));
@@ -1257,6 +1315,9 @@ int main(void) {
   RUN_TEST(test_a_frame_is_located_without_changing_the_map);
   RUN_TEST(test_frames_go_on_as_if_none_had_been_located);
   RUN_TEST(test_the_camera_is_reported);
+  RUN_TEST(test_no_keypoint_is_taken_where_the_mask_is_0);
+  RUN_TEST(test_a_mask_without_0_and_the_frame_of_an_older_header_change_nothing);
+  RUN_TEST(test_what_stands_still_is_reported_as_a_mask);
   RUN_TEST(test_the_clock_is_read);
   RUN_TEST(test_the_bytes_are_as_documented);
   RUN_TEST(test_a_loaded_map_is_the_same_and_is_found_again);

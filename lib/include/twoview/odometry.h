@@ -117,6 +117,11 @@ typedef struct tv_odometry_frame {
      standard deviation of each component; 0 (default): there is no velocity. Once velocities have
      agreed with the map, they also check it. */
   double velocity_m_s[3], velocity_sigma_m_s;
+  /* Which pixels show the scene: an image of the size of `image`, whose bytes are 0 where the
+     picture is left out (drone's legs, text, a border) and anything else where it is used; only
+     corners on a used pixel are kept. Null data (default): all of the picture is used. Its pixels
+     are read during the call only. */
+  tv_image mask;
 } tv_odometry_frame;
 
 /* Writes zeros, and the size, into a struct of struct_size bytes; null is allowed. Programs call
@@ -200,6 +205,10 @@ typedef struct tv_odometry_state {
      standard deviation: about 1 in a map in metres; zeros where nothing is known, or where it was
      saved with the map, whose sensors are not told apart. */
   double height_scale, height_scale_sigma, velocity_scale, velocity_scale_sigma;
+  /* The share of the picture, [0, 1], that was found to stand still while the scene moves
+     (on-screen text, a frame, a watermark, the vehicle's own legs), and of which the next frame
+     takes no keypoints: tv_odometry_still_mask. */
+  double still_share;
 } tv_odometry_state;
 
 /* Writes zeros, and the size, into a struct of struct_size bytes; null is allowed. Programs call
@@ -251,6 +260,14 @@ TV_API tv_status tv_odometry_track(tv_odometry *odometry, const tv_odometry_fram
    point where it was corrected. Keyframes, points and the map's bytes are consistent with it.
    Returns TV_ERR_NULL. */
 TV_API tv_status tv_odometry_camera(const tv_odometry *odometry, tv_camera *camera);
+
+/* Writes which pixels the next frame takes keypoints from as far as the odometry itself has found
+   out: 255, or 0 in cells of 8 x 8 pixels in which matches kept their pixel where no point of the
+   scene could (tv_two_view.num_still). After at least 300 frames such a cell is looked into again.
+   mask: room for width x height bytes, row by row. Returns TV_ERR_NULL, TV_ERR_CAPACITY (cap_bytes
+   is less). */
+TV_API tv_status tv_odometry_still_mask(const tv_odometry *odometry, uint8_t *mask,
+                                        size_t cap_bytes);
 
 /* Does what tracking left for the frames to come: the adjustment of the newest keyframe, and what a
    closed loop asks of the rest of the map. To be called after the last frame, before poses,

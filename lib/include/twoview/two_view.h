@@ -282,8 +282,13 @@ typedef struct tv_two_view {
   /* How many cells of 32 pixels hold an inlier, in the image where fewer do (at most 64 cells, at
      least 16, along the longer side). */
   int32_t num_places;
-  /* Reserved, 0. */
-  int32_t reserved;
+  /* How many of the matches stand still: they keep their pixel, to within twice max_error_px (times
+     the sigma) and at least 2 pixels, while the rest of the picture moves, and no point of the
+     scene can be there at any distance: on-screen text, a frame, a watermark, the vehicle's own
+     legs. They are left out of the estimate and are no inliers. 0 where there are none, without
+     cameras, and where the images differ in size. docs/algorithms/two_view.md, what stands still.
+   */
+  int32_t num_still;
   /* The factor, without a unit, by which the estimate multiplies fx and fy of both cameras, where
      the focal length was refined with the pose (focal_sigma0): all of the result refers to the
      cameras with it, which tv_corrected_camera computes. 0 where the focal length is as given. */

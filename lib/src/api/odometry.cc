@@ -15,6 +15,7 @@
 #include "odometry/loop.h"
 #include "odometry/map_check.h"
 #include "odometry/metric.h"
+#include "odometry/still.h"
 #include "odometry/track.h"
 #include "twoview/match.h"
 #include "twoview/triangulate.h"
@@ -36,6 +37,7 @@ struct Plan {
   size_t context_bytes;
   int32_t columns, rows;
   MapSizes sizes;
+  int32_t still_columns, still_rows;
   size_t scratch_bytes;  // beside the context's, which adjust_segment takes, too
   size_t num_bytes;      // of all
 };
@@ -66,13 +68,24 @@ size_t local_points_bytes(const Plan& plan) {
   return arena_bytes<int32_t>(static_cast<size_t>(plan.limits.max_keypoints));
 }
 
+size_t num_still_cells(const Plan& plan) {
+  return static_cast<size_t>(plan.still_columns) * static_cast<size_t>(plan.still_rows);
+}
+
+size_t still_cells_bytes(const Plan& plan) { return arena_bytes<StillCell>(num_still_cells(plan)); }
+
 void measure_plan(Plan* plan) {
   const size_t segment = adjust_segment_bytes(plan->options);
   const size_t shared = plan->context_bytes - kContextBytes;
-  plan->scratch_bytes = std::max(scratch_bytes(plan->options), segment - std::min(segment, shared));
+  // extract_frame takes a mask of the picture's size.
+  const size_t mask = arena_bytes<uint8_t>(static_cast<size_t>(plan->camera.width) *
+                                           static_cast<size_t>(plan->camera.height));
+  plan->scratch_bytes =
+      std::max(std::max(scratch_bytes(plan->options), mask), segment - std::min(segment, shared));
   plan->num_bytes = kOdometryBytes + arena_bytes<uint8_t>(plan->context_bytes) +
                     map_bytes(plan->sizes) + kNumFrames * frame_bytes(*plan) +
-                    local_points_bytes(*plan) + arena_bytes<uint8_t>(plan->scratch_bytes);
+                    local_points_bytes(*plan) + still_cells_bytes(*plan) +
+                    arena_bytes<uint8_t>(plan->scratch_bytes);
 }
 
 tv_status make_plan(const tv_camera* camera, const tv_odometry_options* options, Plan* plan) {
@@ -98,6 +111,8 @@ tv_status make_plan(const tv_camera* camera, const tv_odometry_options* options,
   plan->limits.purposes = TV_PURPOSE_EXTRACT | TV_PURPOSE_MATCH | TV_PURPOSE_ESTIMATE;
   plan->columns = (camera->width + kCellPx - 1) / kCellPx;
   plan->rows = (camera->height + kCellPx - 1) / kCellPx;
+  plan->still_columns = (camera->width + kStillCellPx - 1) / kStillCellPx;
+  plan->still_rows = (camera->height + kStillCellPx - 1) / kStillCellPx;
   plan->sizes = {o.max_keypoints, o.max_keyframes, o.max_points};
   status = tv_context_size(&plan->limits, &plan->context_bytes);
   if (status == TV_OK) measure_plan(plan);
@@ -125,6 +140,8 @@ void start_anew(tv_odometry* o) {
   o->camera_evidence = CameraEvidence{};
   clear_map(&o->map);
   o->num_starts = o->num_local_points = 0;
+  std::fill_n(o->still_cells, o->still_columns * o->still_rows, StillCell{});
+  o->still_until = 0;
   o->unadjusted_id = o->reference_id = o->confirmed_id = -1;
   o->doubts = 0;
   o->doubtful_segment = -1;
@@ -229,6 +246,9 @@ tv_status tv_odometry_init(tv_odometry** odometry, const tv_camera* camera,
   o->features.cell_px = 32;
   o->grid_columns = plan.columns;
   o->grid_rows = plan.rows;
+  o->still_columns = plan.still_columns;
+  o->still_rows = plan.still_rows;
+  o->still_cells = tv::arena_alloc<tv::StillCell>(arena, tv::num_still_cells(plan));
   tv::make_map(plan.sizes, arena, &o->map);
   tv::make_frame(plan, arena, &o->frame);
   tv::make_frame(plan, arena, &o->previous);
@@ -253,11 +273,18 @@ tv_status tv_odometry_track(tv_odometry* odometry, const tv_odometry_frame* fram
   if (status == TV_OK) status = tv::check_sized(state);
   if (status == TV_OK) status = tv::check_frame_image(*odometry, input.image);
   if (status != TV_OK) return status;
+  const bool has_mask = input.mask.data != nullptr;
+  if (has_mask) status = tv::check_mask(&input.mask, input.image);
+  if (status != TV_OK) return status;
   if (!tv::is_finite(input.time_s)) return TV_ERR_NOT_FINITE;
   if (!tv::within(input.gap, 0, 1)) return TV_ERR_ARGUMENT;
   if (odometry->num_frames > 0 && input.gap == 0 && !(input.time_s > odometry->last_time_s))
     return TV_ERR_TIME;
-  if (tv::overlaps(state, frame, frame->struct_size, input.image)) return TV_ERR_OVERLAP;
+  if (tv::overlaps(state, frame, frame->struct_size, input.image) ||
+      (has_mask &&
+       tv::overlap(state, state->struct_size, input.mask.data, tv::image_bytes(input.mask)))) {
+    return TV_ERR_OVERLAP;
+  }
   tv_odometry_state packed{};
   tv::track_frame(odometry, input, &packed);
   tv::write_sized(packed, state);
@@ -267,6 +294,16 @@ tv_status tv_odometry_track(tv_odometry* odometry, const tv_odometry_frame* fram
 tv_status tv_odometry_camera(const tv_odometry* odometry, tv_camera* camera) {
   if (odometry == nullptr || camera == nullptr) return TV_ERR_NULL;
   *camera = odometry->camera.model;
+  return TV_OK;
+}
+
+tv_status tv_odometry_still_mask(const tv_odometry* odometry, uint8_t* mask, size_t cap_bytes) {
+  if (odometry == nullptr || mask == nullptr) return TV_ERR_NULL;
+  const tv_camera& camera = odometry->given_camera;
+  if (cap_bytes < static_cast<size_t>(camera.width) * static_cast<size_t>(camera.height)) {
+    return TV_ERR_CAPACITY;
+  }
+  tv::write_mask(*odometry, nullptr, mask);
   return TV_OK;
 }
 

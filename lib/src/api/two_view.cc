@@ -12,6 +12,7 @@
 #include "base/math.h"
 #include "robust/covariance.h"
 #include "robust/place_focal_length.h"
+#include "robust/still.h"
 #include "robust/two_view.h"
 
 namespace tv {
@@ -169,8 +170,9 @@ void pack_covariance(const Pose& pose, const Pose& inverse, const double covaria
 // Not inlined, so that its stack frame is not in use during the search.
 __attribute__((noinline)) void pack(const TwoViewProblem& problem, const Matches& matches,
                                     const TwoViewModel& model, const TwoViewOutcome& outcome,
-                                    bool swapped, tv_two_view* result) {
+                                    bool swapped, int num_still, tv_two_view* result) {
   tv_two_view packed{};
+  packed.num_still = num_still;
   packed.kind = outcome.evidence.kind;
   packed.verdict = outcome.judgement.verdict;
   packed.reasons = outcome.judgement.reasons;
@@ -244,6 +246,50 @@ __attribute__((noinline)) void pack(const TwoViewProblem& problem, const Matches
     if (packed.has_H) store(H, packed.H);
   }
   write_sized(packed, result);
+}
+
+// Search and finish. The results lie in the arena, and the problem's cameras are those that they
+// refer to.
+void estimate(tv_context* context, TwoViewProblem& problem, Matches* matches, TwoViewModel* model,
+              TwoViewOutcome* outcome) {
+  {
+    StageTimer timer(context, TV_STAGE_ESTIMATE);
+    prepare_matches(problem, context->arena, matches);
+    if (problem.calibrated && has_uncertain_focal_length(problem)) {
+      search_focal_length(problem, matches, context->arena, model);
+    } else {
+      search_two_view(problem, *matches, context->arena, model);
+    }
+  }
+  StageTimer timer(context, TV_STAGE_REFINE);
+  finish_two_view(problem, *model, context->arena, matches, outcome);
+}
+
+// The same without the matches that stand still. True: they are no part of the scene, and `problem`
+// has them left out; else it is as before, and there are no results.
+bool estimate_without_still(tv_context* context, TwoViewProblem& problem, Matches* matches,
+                            TwoViewModel* model, TwoViewOutcome* outcome, int* num_still) {
+  const tv_camera &first = problem.camera[0].model, &second = problem.camera[1].model;
+  if (!problem.calibrated || first.width != second.width || first.height != second.height) {
+    return false;
+  }
+  uint8_t* is_still = arena_alloc<uint8_t>(context->arena, static_cast<size_t>(problem.num));
+  *num_still = find_still_matches(problem, is_still);
+  if (*num_still == 0) return false;
+  TwoViewProblem without = problem;
+  without.is_still = is_still;
+  const size_t used_bytes = context->arena.used_bytes;
+  estimate(context, without, matches, model, outcome);
+  if (contradicts_still(without, *matches, *outcome, *num_still)) {
+    problem = without;
+    return true;
+  }
+  context->arena.used_bytes = used_bytes;
+  *matches = Matches{};
+  *model = TwoViewModel{};
+  *outcome = TwoViewOutcome{};
+  *num_still = 0;
+  return false;
 }
 
 // Whether an output shares a byte with another argument. Not inlined, for the same reason.
@@ -365,17 +411,13 @@ tv_status tv_estimate_two_view(tv_context* context, const tv_camera* camera0,
       std::swap(o.center_sigma0, o.center_sigma1);
     }
     problem.kernels = context->kernels;
-    tv::prepare_matches(problem, context->arena, &matches);
-    if (calibrated && tv::has_uncertain_focal_length(problem)) {
-      tv::search_focal_length(problem, &matches, context->arena, &model);
-    } else {
-      tv::search_two_view(problem, matches, context->arena, &model);
-    }
   }
-  tv::StageTimer timer(context, TV_STAGE_REFINE);
   tv::TwoViewOutcome outcome{};
-  tv::finish_two_view(problem, model, context->arena, &matches, &outcome);
-  tv::pack(problem, matches, model, outcome, swapped, result);
+  int num_still = 0;
+  if (!tv::estimate_without_still(context, problem, &matches, &model, &outcome, &num_still)) {
+    tv::estimate(context, problem, &matches, &model, &outcome);
+  }
+  tv::pack(problem, matches, model, outcome, swapped, num_still, result);
   if (inlier_mask != nullptr) {
     std::memset(inlier_mask, 0, static_cast<size_t>(num_matches));
     for (int k = 0; k < matches.num_all; ++k) inlier_mask[matches.order[k]] = outcome.inlier[k];

@@ -110,7 +110,13 @@ struct MetricScale {
   double sigma;  // relative; 0 where the source is TV_SCALE_UNIT
 };
 
-inline constexpr int32_t kCellPx = 16;
+// A cell of the picture: the number of the first frame in which it is looked into again, and how
+// many times it was found to stand still (odometry/still.h).
+struct StillCell {
+  int32_t until, num_times;
+};
+
+inline constexpr int32_t kCellPx = 16, kStillCellPx = 8;
 // The error of a pixel of sigma 1 along one axis before one was measured, and the largest one that
 // a point of the map may have, in pixels.
 inline constexpr double kTypicalNoise = 0.7, kLargestError = 3.0;
@@ -135,6 +141,9 @@ struct tv_odometry {
   int32_t grid_columns, grid_rows;
   tv::Frame frame, previous;
   tv::Frame starts[tv::kNumStarts];
+  tv::StillCell* still_cells;
+  int32_t still_columns, still_rows;
+  int32_t still_until;  // the last of theirs
   int32_t num_starts;
   // The points that are looked for in the next frame: those around the reference keyframe.
   int32_t* local_points;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "odometry/still.h"
+
 namespace tv {
 namespace {
 
@@ -67,8 +69,12 @@ bool estimate_pair(Odometry* odometry, const tv_keypoint* keypoints0, const tv_k
   options.seed = odometry->options.seed;
   options.max_iterations = kMostIterations;
   tv_two_view_init(pair->view);
-  return tv_estimate_two_view(odometry->context, &odometry->camera.model, &odometry->camera.model,
-                              &pairs, &options, pair->view, pair->is_inlier) == TV_OK;
+  if (tv_estimate_two_view(odometry->context, &odometry->camera.model, &odometry->camera.model,
+                           &pairs, &options, pair->view, pair->is_inlier) != TV_OK) {
+    return false;
+  }
+  if (pair->view->num_still > 0) mark_still(odometry, keypoints0, keypoints1, matches, num);
+  return true;
 }
 
 double turn_sigma_of(const double* covariance, int num_parameters) {

@@ -126,7 +126,8 @@ bool start_map(Odometry* odometry, Frame* frame, uint32_t* reasons) {
       *reasons |= TV_REASON_LOW_PARALLAX;
       break;
     }
-    if (!match_frames(odometry, *first, *frame, &pair) || 2 * pair.view->num_inliers < pair.num ||
+    if (!match_frames(odometry, *first, *frame, &pair) ||
+        2 * pair.view->num_inliers < pair.num - pair.view->num_still ||
         pair.view->num_inliers < kLeastMatches) {
       *reasons |= TV_REASON_TOO_FEW_MATCHES;
       if (pair.num < kLeastMatches || odometry->num_starts > 1) drop_start(odometry, n--);
@@ -162,7 +163,8 @@ bool estimate_turn(Odometry* odometry, const Frame& frame0, const Frame& frame1,
   ArenaScope scope(odometry->scratch);
   Pair pair;
   if (!match_frames(odometry, frame0, frame1, &pair) || !pair.view->has_R ||
-      pair.view->num_inliers < kLeastTurnInliers || 2 * pair.view->num_inliers < pair.num) {
+      pair.view->num_inliers < kLeastTurnInliers ||
+      2 * pair.view->num_inliers < pair.num - pair.view->num_still) {
     return false;
   }
   *turn = kIdentity;

@@ -14,6 +14,7 @@
 #include "odometry/metric.h"
 #include "odometry/search.h"
 #include "odometry/start.h"
+#include "odometry/still.h"
 
 namespace tv {
 namespace {
@@ -46,9 +47,19 @@ uint8_t grey_at(const tv_image& image, const tv_keypoint& keypoint) {
   return image.data[y * image.stride_bytes + x];
 }
 
-void extract_frame(Odometry* odometry, const tv_image& image, Frame* frame) {
+// mask: null, or of the image's size.
+void extract_frame(Odometry* odometry, const tv_image& image, const tv_image* mask, Frame* frame) {
+  ArenaScope scope(odometry->scratch);
+  tv_image used{};
+  if (odometry->still_until > odometry->num_frames) {
+    const size_t num_pixels = static_cast<size_t>(image.width) * static_cast<size_t>(image.height);
+    uint8_t* pixels = arena_alloc<uint8_t>(odometry->scratch, num_pixels);
+    write_mask(*odometry, mask, pixels);
+    used = tv_image{pixels, image.width, image.height, image.width};
+    mask = &used;
+  }
   frame->num = 0;
-  tv_extract(odometry->context, &image, nullptr, &odometry->features, frame->keypoints,
+  tv_extract(odometry->context, &image, mask, &odometry->features, frame->keypoints,
              frame->descriptors, odometry->options.max_keypoints, &frame->num);
   tv_keypoint_sigmas(frame->keypoints, frame->num, odometry->features.keypoint_size, 1.0,
                      frame->sigmas);
@@ -437,6 +448,7 @@ __attribute__((noinline)) void write_counts(const Odometry& odometry, tv_odometr
     state->velocity_scale = v.product / v.square;
     state->velocity_scale_sigma = std::sqrt(1 / v.square);
   }
+  state->still_share = still_share(odometry);
   state->principal_point_shift_px[0] = odometry.camera.model.cx - odometry.given_camera.cx;
   state->principal_point_shift_px[1] = odometry.camera.model.cy - odometry.given_camera.cy;
 }
@@ -478,7 +490,7 @@ void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry
   if (odometry->took_step) spread_loop(odometry, &odometry->previous);
   correct_camera(odometry, &odometry->previous);
   Frame* frame = &odometry->frame;
-  extract_frame(odometry, input.image, frame);
+  extract_frame(odometry, input.image, input.mask.data != nullptr ? &input.mask : nullptr, frame);
   frame->number = odometry->num_frames++;
   frame->time_s = input.time_s;
   read_sensors(input, frame);
@@ -537,7 +549,7 @@ void locate_frame(Odometry* odometry, const tv_image& image, int32_t near_id,
                   tv_odometry_state* state) {
   const int32_t reference = odometry->reference_id;
   Frame* frame = &odometry->previous;  // has no other use until the next frame comes
-  extract_frame(odometry, image, frame);
+  extract_frame(odometry, image, nullptr, frame);
   PoseFit fit;
   clear_state(*frame, state);
   write_counts(*odometry, state);

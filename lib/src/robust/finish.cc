@@ -23,7 +23,8 @@ size_t two_view_scratch_bytes(int max_matches) {
   const size_t finish = 2 * arena_bytes<int32_t>(n) + arena_bytes<uint8_t>(n) +
                         arena_bytes<double>(n) +
                         std::max(rivals_bytes(max_matches), evidence_bytes(max_matches));
-  return matches_bytes(max_matches) + std::max(search_bytes(max_matches), finish);
+  return arena_bytes<uint8_t>(n) + matches_bytes(max_matches) +
+         std::max(search_bytes(max_matches), finish);
 }
 
 namespace {

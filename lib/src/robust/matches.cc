@@ -230,6 +230,7 @@ void prepare_matches(const TwoViewProblem& problem, Arena& arena, Matches* match
   }
   int count = 0;
   for (int32_t i = 0; i < problem.num; ++i) {
+    if (problem.is_still != nullptr && problem.is_still[i] != 0) continue;
     const Coordinates c = coordinates(problem, i);
     const double sum =
         (std::fabs(c.v[0]) + std::fabs(c.v[1])) + (std::fabs(c.v[2]) + std::fabs(c.v[3]));

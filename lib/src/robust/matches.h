@@ -16,6 +16,7 @@ struct TwoViewProblem {
   const float* ratios;      // null when the matches have no ratios
   const float* sigmas[2];   // tv_pixel_pairs.sigmas0 and sigmas1; null: 1 for all
   int num;
+  const uint8_t* is_still;  // null, or of each match whether it is left out (robust/still.h)
   tv_estimate_options options;
   double focal_log_scale;    // logarithm of the cameras' focal length over the given one
   bool focal_is_ambiguous;   // whether two directions of motion fit, each at its own focal length
