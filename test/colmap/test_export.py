@@ -453,6 +453,42 @@ def test_a_focal_length_and_a_size_stand_in_for_a_camera_file(photographs, tmp_p
     assert keypoints[:, 0].max() < half and keypoints[:, 1].max() < height
 
 
+@pytest.mark.parametrize("more", [(), ("--resize", WIDTH // 2)])
+def test_a_mask_leaves_a_part_of_the_images_out(photographs, tmp_path, call, refuse, more):
+    import cv2
+    from twoview_tools.colmap.database import read_keypoints, reading
+    edge = 400
+    mask = np.full((HEIGHT, WIDTH), 255, np.uint8)
+    mask[:, edge:] = 0
+    (tmp_path / "masks").mkdir()
+    for name, suffix in ((NAMES[0], ".png"), (os.path.splitext(NAMES[1])[0], ".png")):
+        cv2.imwrite(str(tmp_path / "masks" / (name + suffix)), mask)
+    cv2.imwrite(str(tmp_path / "one.png"), mask)
+    (tmp_path / "images").mkdir()
+    for name in NAMES[:2]:
+        shutil.copy(photographs / "images" / name, tmp_path / "images" / name)
+    base = ("export", "--images", tmp_path / "images", "--focal-35mm", "28", "--schema", "3.8",
+            *more)
+    for given in ("masks", "one.png"):
+        database = tmp_path / f"{given}.db"
+        status, _, err = call(*base, "--database", database, "--mask", tmp_path / given)
+        assert status == 0, err
+        with reading(str(database)) as found:
+            for image in (1, 2):
+                x = read_keypoints(found, str(database), image)[:, 0]
+                assert len(x) > 100 and x.max() < (edge / 2 if more else edge) + 2
+    database = ("--database", tmp_path / "x.db")
+    refuse(("--mask", "no such file"), *base, *database, "--mask", tmp_path / "none")
+    cv2.imwrite(str(tmp_path / "one.png"), mask[:100])
+    refuse(("640x100", "640x480"), *base, *database, "--mask", tmp_path / "one.png")
+    cv2.imwrite(str(tmp_path / "one.png"), mask * 0)
+    refuse("black all over", *base, *database, "--mask", tmp_path / "one.png")
+    cv2.imwrite(str(tmp_path / "one.png"), np.zeros((HEIGHT, WIDTH, 4), np.uint8))
+    refuse("transparent", *base, *database, "--mask", tmp_path / "one.png")
+    (tmp_path / "masks" / (NAMES[0] + ".png")).unlink()
+    refuse(("no mask of", NAMES[0]), *base, *database, "--mask", tmp_path / "masks")
+
+
 def test_large_photographs_get_the_advice_to_make_them_smaller(tmp_path, call):
     import cv2
     random = np.random.default_rng(1)

@@ -111,6 +111,10 @@ tv_image Picture::view() const {
   return {luma.data, luma.cols, luma.rows, static_cast<int64_t>(luma.step)};
 }
 
+tv_image Picture::mask_view() const {
+  return {mask.data, mask.cols, mask.rows, static_cast<int64_t>(mask.step)};
+}
+
 namespace {
 
 cv::Mat checked_pixels(const std::string& path, const std::string& bytes) {
@@ -167,6 +171,14 @@ cv::Size shrunk_size(cv::Size size, int longer) {
           std::max(1, static_cast<int>(std::lround(size.height * scale)))};
 }
 
+cv::Mat shrunk_mask(const cv::Mat& mask, int longer) {
+  const cv::Size size = shrunk_size(mask.size(), longer);
+  if (mask.empty() || size == mask.size()) return mask;
+  cv::Mat smaller;
+  cv::resize(mask, smaller, size, 0, 0, cv::INTER_AREA);
+  return smaller == 255;
+}
+
 void shrink(Picture& picture, int longer) {
   const cv::Size size = shrunk_size(picture.luma.size(), longer);
   if (size == picture.luma.size()) return;
@@ -175,6 +187,7 @@ void shrink(Picture& picture, int longer) {
   cv::resize(picture.colour, colour, size, 0, 0, cv::INTER_AREA);
   picture.luma = luma;
   picture.colour = colour;
+  picture.mask = shrunk_mask(picture.mask, longer);
 }
 
 void turn(Picture& picture, int quarters) {
@@ -185,6 +198,11 @@ void turn(Picture& picture, int quarters) {
   cv::Mat luma, colour;
   cv::rotate(picture.luma, luma, turns[quarters - 1]);
   cv::rotate(picture.colour, colour, turns[quarters - 1]);
+  if (!picture.mask.empty()) {
+    cv::Mat mask;  // another one, since the masks of several pictures may share their pixels
+    cv::rotate(picture.mask, mask, turns[quarters - 1]);
+    picture.mask = mask;
+  }
   picture.luma = luma;
   picture.colour = colour;
   if (quarters & 1) std::swap(picture.file_width, picture.file_height);

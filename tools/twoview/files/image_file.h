@@ -18,12 +18,14 @@ struct Picture {
   std::string name;                     // the file name without the folder
   cv::Mat luma;                         // 8-bit grey
   cv::Mat colour;                       // 8-bit BGR, of the size of luma
+  cv::Mat mask;                         // of the size of luma, 0 where it is left out; may be empty
   int file_width = 0, file_height = 0;  // pixels, before resizing
   ExifFocal exif;
   int turn_deg = 0;    // how far a viewer turns it clockwise, which is not done here
   int used_bits = 16;  // bits of the largest sample of a 16-bit file: 12 for what is dark at 16
 
   tv_image view() const;
+  tv_image mask_view() const;  // null data without a mask
   // The number of pixels of this image for one pixel of the file: 1 unless it was resized.
   double scale_x() const { return static_cast<double>(luma.cols) / file_width; }
   double scale_y() const { return static_cast<double>(luma.rows) / file_height; }
@@ -50,8 +52,10 @@ std::string unread_picture_file(const std::string& path);
 cv::Size shrunk_size(cv::Size size, int longer);
 
 // Reduces the image by area averaging so that its longer side has `longer` pixels. It never
-// enlarges; 0 means no resizing.
+// enlarges; 0 means no resizing. A pixel is used where all pixels under it are, by the mask.
 void shrink(Picture& picture, int longer);
+// The same of a mask (255 used, 0 left out) alone.
+cv::Mat shrunk_mask(const cv::Mat& mask, int longer);
 
 // Rotates the image counter-clockwise by this number of quarter turns.
 void turn(Picture& picture, int quarters);

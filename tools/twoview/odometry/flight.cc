@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <map>
+#include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <set>
 
@@ -102,6 +103,8 @@ void Flight::prepare(SourceFrame& frame) {
     throw BadInput("frame " + frame.name + " is " + std::to_string(frame.luma.cols) + "x" +
                    std::to_string(frame.luma.rows) + ", not " + std::to_string(file_camera_.width) +
                    "x" + std::to_string(file_camera_.height) + " as the first one");
+  mask_ =
+      shrunk_mask(options_.masks.of(frame.name, frame.luma.cols, frame.luma.rows), options_.resize);
   frame.luma = shrunk(frame.luma, options_.resize);
 }
 
@@ -175,6 +178,7 @@ void Flight::track_frame(SourceFrame frame) {
   tv_odometry_frame_init(&input);
   input.gap = frame.gap || gap_ ? 1 : 0;
   input.image = view_of(frame.luma);
+  if (!mask_.empty()) input.mask = view_of(mask_);
   input.time_s = frame.time_s;
   if (frame.world_from_cam) {
     std::copy(frame.world_from_cam->begin(), frame.world_from_cam->end(), input.world_from_cam);
@@ -192,6 +196,7 @@ void Flight::track_frame(SourceFrame frame) {
   check(tv_odometry_track(odometry_, &input, &state_), "frame " + frame.name);
   record.time_ms = cpu_ms() - before;
   gap_ = false;
+  add_still_mask();
   record.status = state_.status;
   record.reasons = state_.reasons;
   record.is_keyframe = state_.is_keyframe != 0;
@@ -212,8 +217,19 @@ void Flight::track_frame(SourceFrame frame) {
   if (frame.world_from_cam) is_upright_ = true;
   picture_ = frame.luma;
   if (record.is_keyframe) thumbnails_[static_cast<int>(given_.size())] = thumbnail_of(frame.luma);
+  masked_ += cli::masked_share(mask_);
   given_.push_back(frames_.size());
   frames_.push_back(record);
+}
+
+void Flight::add_still_mask() {
+  if (!(state_.still_share > 0)) return;
+  cv::Mat mask(camera_.height, camera_.width, CV_8U);
+  check(tv_odometry_still_mask(odometry_, mask.data, mask.total()), "the mask");
+  if (still_mask_.empty())
+    still_mask_ = mask;
+  else
+    still_mask_ &= mask;
 }
 
 void Flight::finish(const std::atomic<bool>& stop) {

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "files/mask_file.h"
 #include "odometry/frames.h"
 #include "odometry/poses.h"
 #include "twoview/odometry.h"
@@ -74,7 +75,8 @@ struct FlightOptions {
   tv_odometry_options odometry;
   int max_frames = 0;  // 0: all
   int every = 1;
-  int resize = 0;              // longer side, pixels; 0: as they are
+  int resize = 0;  // longer side, pixels; 0: as they are
+  Masks masks;
   bool scales_camera = false;  // whether camera_file may be for another size of the picture
   std::string camera_file;     // empty: the source's own camera, or
   double focal_35mm = 0;       // a pinhole's of this focal length, millimetres; 0: none
@@ -120,6 +122,14 @@ class Flight {
     return state_.principal_point_shift_px[0] != 0 || state_.principal_point_shift_px[1] != 0;
   }
   size_t context_bytes() const { return context_bytes_; }
+  // The mean share of the frames that masks have left out; 0 without masks.
+  double masked_share() const {
+    return given_.empty() ? 0 : masked_ / static_cast<double>(given_.size());
+  }
+  // Of all pixels that were found to stand still while the scene moved, in any frame: 0 in a
+  // picture of 255, of the frames' size as they are tracked; empty where there were none.
+  const cv::Mat& still_mask() const { return still_mask_; }
+  const std::vector<std::string>& mask_files() const { return options_.masks.files(); }
   int num_unreadable() const { return num_unreadable_; }
   const std::string& first_problem() const { return first_problem_; }
   // Whether the source ended before its frames could be tracked to the end, or --max-frames did.
@@ -133,15 +143,18 @@ class Flight {
 
  private:
   bool wants(int index) const;
-  // Scales the frame down; throws BadInput where it does not fit the camera.
+  // Scales the frame and its mask, which is put into mask_, down; throws BadInput where it does not
+  // fit the camera.
   void prepare(SourceFrame& frame);
   void start(const SourceFrame& frame);
   void track_frame(SourceFrame frame);
+  void add_still_mask();
   void locate(SourceFrame frame, FlightFrame& record, int32_t near_id);
 
   FrameSource& source_;
   FlightOptions options_;
   std::vector<std::string> notes_;
+  cv::Mat mask_;                        // of the frame
   tv_camera file_camera_{}, camera_{};  // of the frames' files, and as they are tracked
   struct Free {
     void operator()(void* memory) const;
@@ -152,6 +165,8 @@ class Flight {
   tv_odometry_state state_;
   std::vector<FlightFrame> frames_;
   cv::Mat picture_;
+  cv::Mat still_mask_;
+  double masked_ = 0;                    // sum of the shares that masks have left out
   std::vector<size_t> given_;            // indices of frames_
   std::map<int, Thumbnail> thumbnails_;  // by the number of the frame that was given
   bool is_upright_ = false;

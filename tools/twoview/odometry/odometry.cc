@@ -6,12 +6,14 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <opencv2/core.hpp>
 
 #include "base/error.h"
 #include "base/output.h"
 #include "base/terminal.h"
 #include "files/camera_file.h"
 #include "files/camera_formats.h"
+#include "files/image_file.h"
 #include "odometry/flight.h"
 #include "odometry/live.h"
 #include "odometry/outputs.h"
@@ -33,8 +35,9 @@ namespace {
 namespace fs = std::filesystem;
 
 const char* const kCameraFile = "corrected_camera.yaml";
+const char* const kStillFile = "still_mask.png";
 const std::vector<std::string> kFiles = {
-    "trajectory.txt", "live.txt",  "keyframes.txt", kCameraFile,   "covariances.txt",
+    "trajectory.txt", "live.txt",  "keyframes.txt", kCameraFile,   "covariances.txt", kStillFile,
     "frames.csv",     "cloud.ply", "map.twm",       "report.html", "result.json"};
 const std::vector<std::string> kColmapFiles = {"cameras.txt", "images.txt", "points3D.txt"};
 
@@ -174,6 +177,7 @@ nlohmann::ordered_json options_of(const Arguments& a, const std::string& truth_f
                                  {"every", a.flight.every},
                                  {"fps", a.fps}};
   json["resize"] = a.flight.resize;
+  json["mask"] = mask_json(a.flight.masks);
   json["no_imu"] = a.ignores_imu;
   json["kernels"] = tv_kernels_string(static_cast<tv_kernels>(o.kernels));
   json["camera"] = text_or_null(a.camera);
@@ -194,6 +198,8 @@ void make_files(const FlightResult& result, const std::string& name, OutputSet& 
   files.add("report.html", flight_report(result, name));
   if (flight.has_corrected_camera() && !files.is_input(kCameraFile))
     files.add(kCameraFile, camera_yaml(flight.corrected_file_camera()));
+  if (!flight.still_mask().empty() && !files.is_input(kStillFile))
+    files.add(kStillFile, png_bytes(flight.still_mask()));
   if (result.keyframes.empty()) return;
   files.add("keyframes.txt", keyframes_text(result));
   const std::string covariances = covariances_text(result.keyframes);
@@ -220,6 +226,31 @@ std::string truth_line(const nlohmann::ordered_json& truth) {
                              100 * truth["coverage"].get<double>());
 }
 
+// Where most of what stands still lies, such as " at the lower edge"; empty where it lies all over.
+std::string place_of(const cv::Mat& mask) {
+  const int rows = mask.rows / 4, columns = mask.cols / 4;
+  const auto left_out = [](const cv::Mat& part) {
+    return static_cast<double>(part.total()) - cv::countNonZero(part);
+  };
+  const std::pair<const char*, cv::Mat> edges[] = {
+      {"lower", mask.rowRange(mask.rows - rows, mask.rows)},
+      {"upper", mask.rowRange(0, rows)},
+      {"left", mask.colRange(0, columns)},
+      {"right", mask.colRange(mask.cols - columns, mask.cols)}};
+  const double all = left_out(mask);
+  for (const auto& [name, part] : edges)
+    if (left_out(part) > 0.8 * all) return std::string(" at the ") + name + " edge";
+  return "";
+}
+
+std::string still_note(const FlightResult& result) {
+  char share[32];
+  std::snprintf(share, sizeof share, "%.1f", 100 * result.json["still_share"].get<double>());
+  return std::string("parts of the picture stand still while the scene moves (") + share +
+         " % of it" + place_of(result.flight->still_mask()) + "): left out, " + kStillFile +
+         " shows where";
+}
+
 std::string summary(const FlightResult& result, const FrameSource& source, const OutputSet& files,
                     bool has_colmap) {
   const nlohmann::ordered_json& j = result.json;
@@ -232,6 +263,8 @@ std::string summary(const FlightResult& result, const FrameSource& source, const
   text += summary_line("tracking", "%s", counts.c_str());
   text += summary_line("path", "%d frames with a pose, %d of them found in the map afterwards",
                        j["num_tracked"].get<int>(), j["num_located"].get<int>());
+  if (const double share = j["masked_share"].get<double>(); share > 0)
+    text += summary_line("mask", "leaves %.1f %% of the picture out", 100 * share);
   if (const int ignored = j["num_attitudes_ignored"].get<int>(); ignored > 0)
     text += summary_line("attitude", "of %d frames contradicts the map and was left out", ignored);
   const int segments = j["num_segments"].get<int>();
@@ -323,9 +356,11 @@ int odometry(Arguments& a) {
   }
   if (flight.frames().empty()) throw BadInput("no frame came from " + source->kind());
   for (const std::string& note : flight.notes()) common.note(note);
+  for (const std::string& mask : flight.mask_files()) files.keep(mask);
   flight.finish(stop);
   FlightResult result =
       result_of(flight, truth, wanted < 0 ? static_cast<int>(flight.frames().size()) : wanted);
+  if (!flight.still_mask().empty()) common.note(still_note(result));
   result.json["interrupted"] = stop.load();
   result.json["source"] = a.source.empty() ? source->kind() : a.source;
   result.json["options"] = options_of(a, truth_file);
@@ -401,6 +436,7 @@ void add_odometry(CLI::App& program, Run& run) {
   add_number(*verb, "seed", &o.seed, 0, kLargestSeed, "of the samplers");
   CLI::Option* resize = add_number(*verb, "resize", &a->flight.resize, 0, kMaxSide,
                                    "scale frames down to this longer side, pixels; 0: as they are");
+  add_mask(*verb, a->flight.masks);
   add_kernels(*verb, o.kernels);
 #ifdef TWOVIEW_HAS_DRONE
   verb->add_option("--drone", a->drone.host, "in place of SOURCE: the address of an AR.Drone")

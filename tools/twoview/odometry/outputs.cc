@@ -248,6 +248,8 @@ Json flight_json(const FlightResult& result) {
   json["num_relocalisations"] = state.num_relocations;
   json["num_loops"] = state.num_loops;
   json["num_attitudes_ignored"] = num_ignored;
+  json["masked_share"] = flight.masked_share();
+  json["still_share"] = masked_share(flight.still_mask());
   json["longest_segment"] = result.segment;
   json["path_length"] = path_length(trajectory_of(flight, result.segment));
   for (int32_t s = 0; s < TV_ODOMETRY_NUM_STATUSES; ++s)

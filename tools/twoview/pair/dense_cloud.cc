@@ -22,6 +22,19 @@ tv_dense_options options_for(int32_t most) {
   return options;
 }
 
+// Whether the masks use the pixels that show a point.
+bool is_used(const Outcome& outcome, const tv_dense_point& point) {
+  const float* const pixels[] = {point.pixel0, point.pixel1};
+  for (int i = 0; i < 2; ++i) {
+    const cv::Mat& mask = outcome.picture[i].mask;
+    if (mask.empty()) continue;
+    const int x = std::clamp(static_cast<int>(std::lround(pixels[i][0])), 0, mask.cols - 1);
+    const int y = std::clamp(static_cast<int>(std::lround(pixels[i][1])), 0, mask.rows - 1);
+    if (mask.at<uint8_t>(y, x) == 0) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 uint64_t densify_pair(int32_t most, Outcome& outcome) {
@@ -44,6 +57,9 @@ uint64_t densify_pair(int32_t most, Outcome& outcome) {
         "cannot make a dense cloud");
   const uint64_t time_ns = now_ns() - start_ns;
   points.resize(static_cast<size_t>(count));
+  points.erase(std::remove_if(points.begin(), points.end(),
+                              [&](const tv_dense_point& p) { return !is_used(outcome, p); }),
+               points.end());
   outcome.dense = std::move(points);
   return time_ns;
 }

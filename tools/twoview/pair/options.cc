@@ -337,7 +337,20 @@ CLI::Option* add_kernels(CLI::App& verb, int32_t& kernels) {
       verb, {"kernels", kCommon, Choice{&kernels, &kKernels}, 0, 0, Option::kClosed, "kernel set"});
 }
 
+void add_mask(CLI::App& verb, Masks& masks) {
+  verb.add_option("--mask", masks.path,
+                  "picture of the images' size, black where they are left out; or a folder of "
+                  "masks NAME.png")
+      ->type_name("FILE|DIR")
+      ->check(CLI::ExistingPath);
+}
+
+nlohmann::ordered_json mask_json(const Masks& masks) {
+  return masks.given() ? nlohmann::ordered_json(masks.path) : nlohmann::ordered_json(nullptr);
+}
+
 void add_options(CLI::App& verb, Options& options, unsigned groups) {
+  if (groups & kFeature) add_mask(verb, options.masks);
   for (const Option& option : table(options)) {
     if (!(option.group & groups)) continue;
     CLI::Option* flag = add_option(verb, option)->group(group_title(option.group));
@@ -358,6 +371,7 @@ nlohmann::ordered_json options_json(const Options& options, unsigned groups) {
     if (key == "resize" && options.resize == kByItself)
       json[key] = options.was_large ? kUsualSide : 0;
   }
+  if (groups & kFeature) json["mask"] = mask_json(options.masks);
   return json;
 }
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <variant>
 
+#include "files/mask_file.h"
 #include "twoview/twoview.h"
 
 namespace cli {
@@ -31,6 +32,7 @@ struct Options {
   bool min_threshold_given = false;
   // Of the calibration (tv_estimate_options); below 0: what the camera file says.
   double focal_sigma = -1, center_sigma = -1;
+  Masks masks;                   // of the pictures whose corners are found
   double gravity_sigma_deg = 0;  // settle() copies it, in radians, to `estimate`
 
   Options();
@@ -79,6 +81,10 @@ void add_scale_camera(CLI::App& verb, bool& scales_camera);
 CLI::Option* add_number(CLI::App& verb, const char* name,
                         std::variant<int32_t*, uint64_t*, double*> value, double low, double high,
                         const char* help);
+
+// Adds --mask to a verb; and the path as a JSON value, null where none is given.
+void add_mask(CLI::App& verb, Masks& masks);
+nlohmann::ordered_json mask_json(const Masks& masks);
 
 // Adds --kernels to a verb.
 CLI::Option* add_kernels(CLI::App& verb, int32_t& kernels);

@@ -11,9 +11,11 @@ uint64_t reconstruct_pair(Session& session, const Options& options, Outcome& out
   tv_context* context =
       session.context(std::max(p0.luma.cols, p1.luma.cols), std::max(p0.luma.rows, p1.luma.rows));
   tv_view views[2];
+  const tv_image masks[2] = {p0.mask_view(), p1.mask_view()};
   for (int i = 0; i < 2; ++i) {
     tv_view_init(&views[i]);
     views[i].image = outcome.picture[i].view();
+    views[i].mask = masks[i].data ? &masks[i] : nullptr;
     views[i].camera = outcome.has_cameras ? &outcome.camera[i] : nullptr;
   }
   tv_two_view_init(&outcome.two_view);

@@ -294,6 +294,9 @@ Json result_json(const Outcome& outcome) {
   json["image_size0"] = {outcome.picture[0].luma.cols, outcome.picture[0].luma.rows};
   json["image_size1"] = {outcome.picture[1].luma.cols, outcome.picture[1].luma.rows};
   json["num_keypoints"] = {r.num_keypoints[0], r.num_keypoints[1]};
+  json["num_still_matches"] = v.num_still;
+  json["masked_share"] = {masked_share(outcome.picture[0].mask),
+                          masked_share(outcome.picture[1].mask)};
   json["num_matches"] = r.num_matches;
   json["num_matches_left_out"] = r.num_matches_left_out;
   json["num_inliers"] = v.num_inliers;

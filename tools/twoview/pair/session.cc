@@ -72,10 +72,11 @@ Features extract(tv_context* context, const Picture& picture, const Options& opt
   const auto capacity = static_cast<size_t>(options.feature.max_keypoints);
   features.keypoints.resize(capacity);
   features.descriptors.resize(capacity * TV_DESCRIPTOR_BYTES);
-  const tv_image image = picture.view();
+  const tv_image image = picture.view(), mask = picture.mask_view();
   int32_t count = 0;
-  check(tv_extract(context, &image, nullptr, &options.feature, features.keypoints.data(),
-                   features.descriptors.data(), static_cast<int32_t>(capacity), &count),
+  check(tv_extract(context, &image, mask.data ? &mask : nullptr, &options.feature,
+                   features.keypoints.data(), features.descriptors.data(),
+                   static_cast<int32_t>(capacity), &count),
         picture.path);
   features.keypoints.resize(static_cast<size_t>(count));
   features.descriptors.resize(static_cast<size_t>(count) * TV_DESCRIPTOR_BYTES);

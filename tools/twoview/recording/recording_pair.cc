@@ -181,6 +181,7 @@ RecordingPair choose_pair(const std::string& folder, const RecordedFlight& fligh
         whole[k] = picture_of(frames[k], pictures.at(frames[k].index));
         outcome.picture[k] = whole[k];
         const cv::Mat& luma = whole[k].luma;
+        outcome.picture[k].mask = options.masks.of(whole[k].name, luma.cols, luma.rows);
         shrink(outcome.picture[k], options.longer_side(luma.cols, luma.rows));
         outcome.camera[k] =
             resized(camera, outcome.picture[k].luma.cols, outcome.picture[k].luma.rows);

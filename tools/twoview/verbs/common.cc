@@ -42,6 +42,13 @@ std::string Common::note_lines() const {
   return lines;
 }
 
+void add_picture_mask(const std::string& name, Picture& picture, Common& common) {
+  const Masks& masks = common.options.masks;
+  picture.mask = masks.of(name, picture.luma.cols, picture.luma.rows);
+  if (masks.given() && masked_share(picture.mask) == 0)
+    common.note("the mask of " + name + " leaves nothing out: it has no black pixel");
+}
+
 void bring_to_size(Picture& picture, Common& common) {
   const int width = picture.luma.cols, height = picture.luma.rows;
   shrink(picture, common.options.longer_side(width, height));

@@ -32,6 +32,10 @@ struct Common {
 };
 void add_common(CLI::App& verb, Common& common, unsigned groups, const std::string& output_help);
 
+// Gives the picture its mask, where --mask is given; `name` is the picture's in a folder of masks.
+// It is noted where the mask leaves nothing out.
+void add_picture_mask(const std::string& name, Picture& picture, Common& common);
+
 // Scales the picture down as --resize says, or a large one by itself, which is noted. A picture
 // of 16-bit samples of which only few bits are used is noted as well.
 void bring_to_size(Picture& picture, Common& common);

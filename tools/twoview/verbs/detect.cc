@@ -22,9 +22,11 @@ int detect(Arguments& a) {
   Common& common = a.common;
   common.options.settle();
   Picture picture = load_picture(a.image);
+  add_picture_mask(picture.name, picture, common);
   bring_to_size(picture, common);
   OutputSet files(common.output);
   files.keep(a.image);
+  for (const std::string& mask : common.options.masks.files()) files.keep(mask);
   Session session(common.options);
   tv_context* context = session.context(picture.luma.cols, picture.luma.rows);
   auto watch = std::make_unique<Stopwatch>(!common.quiet, watch_text(common.options));
@@ -36,6 +38,7 @@ int detect(Arguments& a) {
   nlohmann::ordered_json json;
   json["image"] = picture.name;
   json["image_size"] = {picture.luma.cols, picture.luma.rows};
+  json["masked_share"] = masked_share(picture.mask);
   json["num_keypoints"] = features.keypoints.size();
   json["timings_ms"] = session.take_times(total_ns, false);
   json["context_bytes"] = session.context_bytes();

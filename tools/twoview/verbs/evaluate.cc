@@ -87,6 +87,7 @@ void load_pair(Arguments& a, const Cameras& cameras, const Pair& pair, Outcome& 
     Picture& picture = outcome.picture[i];
     picture = load_picture((fs::path(a.images) / *names[i]).string());
     outcome.camera[i] = cameras.of(*names[i], picture, pair.has_K ? Ks[i] : nullptr);
+    add_picture_mask(*names[i], picture, a.common);
     turn(picture, turns[i]);
     outcome.camera[i] = turned(outcome.camera[i], turns[i]);
     bring_to_size(picture, a.common);
@@ -128,8 +129,12 @@ PairReport evaluate_pair(Arguments& a, const Cameras& cameras, const Pair& pair,
     load_pair(a, cameras, pair, outcome);
     const uint64_t total_ns = reconstruct_pair(session, a.common.options, outcome);
     const tv_two_view& v = outcome.two_view;
+    if (a.common.options.masks.given())
+      json["masked_share"] = {masked_share(outcome.picture[0].mask),
+                              masked_share(outcome.picture[1].mask)};
     json["num_matches"] = v.num_matches;
     json["num_inliers"] = v.num_inliers;
+    if (v.num_still > 0) json["num_still_matches"] = v.num_still;
     json["config"] = tv_kind_string(static_cast<tv_kind>(v.kind));
     json["verdict"] = tv_verdict_string(static_cast<tv_verdict>(v.verdict));
     json["reasons"] = reasons_json(v.reasons);

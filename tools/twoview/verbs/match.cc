@@ -46,10 +46,12 @@ int match(Arguments& a) {
   Picture picture[2];
   for (int i = 0; i < 2; ++i) {
     picture[i] = load_picture(a.image[i]);
+    add_picture_mask(picture[i].name, picture[i], common);
     bring_to_size(picture[i], common);
   }
   OutputSet files(common.output);
   for (const std::string& image : a.image) files.keep(image);
+  for (const std::string& mask : common.options.masks.files()) files.keep(mask);
   Session session(common.options);
   tv_context* context = session.context(std::max(picture[0].luma.cols, picture[1].luma.cols),
                                         std::max(picture[0].luma.rows, picture[1].luma.rows));
@@ -67,6 +69,7 @@ int match(Arguments& a) {
   for (int i = 0; i < 2; ++i) json["image" + std::to_string(i)] = picture[i].name;
   for (int i = 0; i < 2; ++i)
     json["image_size" + std::to_string(i)] = {picture[i].luma.cols, picture[i].luma.rows};
+  json["masked_share"] = {masked_share(picture[0].mask), masked_share(picture[1].mask)};
   json["num_keypoints"] = {features[0].keypoints.size(), features[1].keypoints.size()};
   json["num_matches"] = matches.size();
   json["timings_ms"] = session.take_times(total_ns, false);

@@ -134,6 +134,7 @@ ImageCameras load_inputs(Arguments& a, RecordingInput* recording, Session& sessi
   outcome.has_camera_files = cameras[0].source == ImageCamera::kFile;
   for (size_t i = 0; i < 2; ++i) {
     Picture& picture = outcome.picture[i];
+    add_picture_mask(picture.name, picture, a.common);
     bring_to_size(picture, a.common);
     if (outcome.has_cameras)
       outcome.camera[i] = resized(cameras[i].camera, picture.luma.cols, picture.luma.rows);
@@ -153,6 +154,13 @@ nlohmann::ordered_json options_of(const Arguments& a) {
   json["dense"] = a.dense;
   json["focal_35mm"] = focal > 0 ? nlohmann::ordered_json(focal) : nlohmann::ordered_json(nullptr);
   return json;
+}
+
+void note_still_matches(const tv_two_view& v, Common& common) {
+  if (v.num_still == 0) return;
+  common.note(std::to_string(v.num_still) + " of " + std::to_string(v.num_matches) +
+              " matches stand still while the rest of the picture moves (on-screen text, a frame, "
+              "a watermark): left out");
 }
 
 // Makes the output files that the result permits, in the order of the report.
@@ -354,6 +362,7 @@ int reconstruct(Arguments& a) {
   }
   OutputSet files(common.output);
   for (const std::string& image : a.image) files.keep(image);
+  for (const std::string& mask : common.options.masks.files()) files.keep(mask);
   for (const std::string& camera : a.cameras.files()) files.keep(camera_path(camera));
   files.keep(a.truth);
   uint64_t total_ns = 0;
@@ -380,6 +389,7 @@ int reconstruct(Arguments& a) {
   outcome.json["cameras"] = cameras_json(cameras);
   outcome.json["options"] = options_of(a);
   outcome.json["kernels"] = session.kernels();
+  note_still_matches(outcome.two_view, common);
   outcome.notes = common.notes;
   make_files(outcome, files);
 

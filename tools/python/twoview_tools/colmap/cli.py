@@ -56,6 +56,12 @@ def _add_size_and_focal(parser):
                              "written is of such images (default: 0, as they are)")
 
 
+def _add_mask(parser):
+    parser.add_argument("--mask", default="", metavar="FILE|DIR",
+                        help="picture of the images' size, black where they are left out; or a "
+                             "folder of masks NAME.png")
+
+
 def _choice_of_pairs(parser, required=False):
     which = parser.add_mutually_exclusive_group(required=required)
     which.add_argument("--pairs", default="", metavar="FILE", help="the pairs of a pairs file")
@@ -78,6 +84,7 @@ def _add_export(verbs):
              "own",
     )
     _add_size_and_focal(parser)
+    _add_mask(parser)
     parser.add_argument("--schema", choices=("4", "3.8"), default="4",
                         help="COLMAP 4, or 3.8 as Debian has it (default: 4)")
     parser.add_argument("--append", action="store_true", help="add to a database that is there")
@@ -101,6 +108,7 @@ def _export(arguments):
         arguments.quiet or arguments.json,
         arguments.focal_35mm,
         arguments.resize,
+        arguments.mask,
     )
     counts = export(job, *(settings.options_of(arguments, kind) for kind in
                            (tv.FeatureOptions, tv.MatchOptions, tv.EstimateOptions)))
@@ -194,6 +202,7 @@ def _add_model(verbs):
         "--camera1", default="", metavar="YAML", help="of the second, where it is another"
     )
     _add_size_and_focal(parser)
+    _add_mask(parser)
     parser.add_argument("-o", "--output", required=True, metavar="DIR",
                         help="of cameras.txt, images.txt, points3D.txt and trajectory.tum")
     settings.add_options(parser)
@@ -221,7 +230,7 @@ def _model(arguments):
             f"names"
         )
     pose, model = reconstruct(a.images, names, cameras, *(settings.options_of(a, kind) for kind in (
-        tv.FeatureOptions, tv.MatchOptions, tv.EstimateOptions)), resize=a.resize or 0)
+        tv.FeatureOptions, tv.MatchOptions, tv.EstimateOptions)), resize=a.resize or 0, mask=a.mask)
     if model is None:
         print(f"twoview: no full pose: {pose.kind.name.lower()}", file=sys.stderr)
         return EXIT_NO_POSE

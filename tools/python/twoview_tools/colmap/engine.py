@@ -25,10 +25,10 @@ class Engine:
                                       max_matches=self.max_matches)
         return self.context
 
-    def extract(self, luma, name):
+    def extract(self, luma, name, mask=None):
         try:
             return tv.extract(
-                self._context(luma.shape[1], luma.shape[0]), luma, options=self.feature
+                self._context(luma.shape[1], luma.shape[0]), luma, mask, options=self.feature
             )
         except tv.StatusError as error:
             raise BadInput(f"image {name}: {error}") from None

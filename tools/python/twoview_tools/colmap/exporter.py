@@ -25,6 +25,7 @@ from .database import (
 from .engine import Engine, pixels_of
 from .errors import BadInput
 from .images import list_images, read_luma, shrunk
+from .masks import Masks, shrunk_mask
 from .pairs import exhaustive, read_pairs, sequential
 from .progress import progress
 from .settings import PRINCIPAL_POINT_SIGMA_OF_A_DATABASE
@@ -53,6 +54,7 @@ class Job:
     #: longer side to which images and cameras are scaled down; 0: as they are; None: not given,
     #: which is as 0 with a note where the first image is large
     resize: Optional[int] = None
+    mask: str = ""  #: a file for all images, or a folder of masks; empty: none
 
 
 def choose_pairs(job):
@@ -100,17 +102,19 @@ def _describe_images(job, pairs, engine):
     folders = [os.path.dirname(os.path.abspath(job.pairs))] if job.pairs else []
     folders += [job.images, os.path.dirname(os.path.abspath(job.images))]
     choice = CameraChoice(job.cameras, folders, job.focal_35mm)
-    views = {}
+    views, masks = {}, Masks(job.mask)
     intrinsics = _intrinsics(job, pairs)
     if job.resize is None and intrinsics:
         _advise_on_size(job, next(iter(intrinsics)))
     for name, K in progress(intrinsics.items(), "image", job.quiet):
         luma = read_luma(os.path.join(job.images, name))
         camera = choice.of(name, luma.shape[1], luma.shape[0], K)
+        mask = masks.of(name, luma)
         if job.resize:
+            mask = shrunk_mask(mask, job.resize)
             luma = shrunk(luma, job.resize)
             camera = resized(camera, luma.shape[1], luma.shape[0])
-        views[name] = View(camera, *engine.extract(luma, name))
+        views[name] = View(camera, *engine.extract(luma, name, mask))
     return views
 
 

@@ -22,8 +22,9 @@ def list_images(folder):
     return [name for name in names if name.lower().endswith(EXTENSIONS)], left_out(folder, names)
 
 
-def _decode(path):
-    """Decodes to 8 bits and 1, 3 (BGR) or 4 (BGRA) channels, with the pixels as they are stored."""
+def decode(path, keeps_depth=False):
+    """Decodes to 8 bits (or 16, where the file has them and `keeps_depth`) and 1, 3 (BGR) or 4
+    (BGRA) channels, with the pixels as they are stored."""
     # OpenCV reads this variable when it is imported: OFF, so that only our own error line is
     # printed.
     os.environ.setdefault("OPENCV_LOG_LEVEL", "OFF")
@@ -38,9 +39,9 @@ def _decode(path):
         unread = unread_picture(path)
         raise BadInput(f"image {path} {unread}" if unread else
                        f"image {path}: not an image that OpenCV reads")
-    if image.dtype == np.uint16:  # 16-bit samples are divided by 257 and rounded
+    if image.dtype == np.uint16 and not keeps_depth:  # samples are divided by 257 and rounded
         image = ((image.astype(np.uint32) + 128) // 257).astype(np.uint8)
-    if image.dtype != np.uint8:
+    if image.dtype not in (np.uint8, np.uint16):
         raise BadInput(f"image {path}: samples of {image.dtype}, not of 8 or 16 bits")
     if image.ndim == 3 and image.shape[2] not in (3, 4):
         raise BadInput(f"image {path}: {image.shape[2]} channels, not 1, 3 or 4")
@@ -67,7 +68,7 @@ def shrunk(image, longer):
 
 def read_luma(path):
     """The luma, (height, width) uint8: 0.299 R + 0.587 G + 0.114 B."""
-    image = _decode(path)
+    image = decode(path)
     if image.ndim == 3:
         import cv2
         image = cv2.cvtColor(image, {3: cv2.COLOR_BGR2GRAY, 4: cv2.COLOR_BGRA2GRAY}[image.shape[2]])
@@ -76,5 +77,5 @@ def read_luma(path):
 
 def read_rgb(path):
     """Reads an image as RGB, (height, width, 3) uint8."""
-    image = _decode(path)
+    image = decode(path)
     return np.repeat(image[..., None], 3, axis=2) if image.ndim == 2 else image[..., 2::-1]

@@ -7,14 +7,16 @@ from .cameras import resized
 from .engine import pixels_of
 from .errors import BadInput
 from .images import read_luma, read_rgb, shrunk
+from .masks import Masks, shrunk_mask
 from .model import TwoViewModel
 
 
-def reconstruct(paths, names, cameras, feature=None, match=None, estimate=None, resize=0):
+def reconstruct(paths, names, cameras, feature=None, match=None, estimate=None, resize=0,
+                mask=""):
     """(TwoView, TwoViewModel); the model is None without a full pose. Images and cameras are scaled
-    down so that the longer side is `resize`, where it is above 0. The model's cameras are those
-    that pose and points refer to: the given ones with the estimated shift of the principal point
-    (twoview.corrected_camera)."""
+    down so that the longer side is `resize`, where it is above 0. mask: a file for both images, or
+    a folder of masks; empty: none. The model's cameras are those that pose and points refer to: the
+    given ones with the estimated shift of the principal point (twoview.corrected_camera)."""
     lumas = [read_luma(path) for path in paths]
     for path, luma, camera in zip(paths, lumas, cameras):
         if (camera.height, camera.width) != luma.shape:
@@ -22,6 +24,8 @@ def reconstruct(paths, names, cameras, feature=None, match=None, estimate=None, 
                 f"image {path} is {luma.shape[1]}x{luma.shape[0]}, but its camera is for "
                 f"{camera.width}x{camera.height}"
             )
+    masks = Masks(mask)
+    used = [shrunk_mask(masks.of(name, luma), resize) for name, luma in zip(names, lumas)]
     lumas = [shrunk(luma, resize) for luma in lumas]
     cameras = [resized(camera, luma.shape[1], luma.shape[0])
                for camera, luma in zip(cameras, lumas)] if resize else cameras
@@ -38,6 +42,8 @@ def reconstruct(paths, names, cameras, feature=None, match=None, estimate=None, 
                 cameras[0],
                 lumas[1],
                 cameras[1],
+                mask0=used[0],
+                mask1=used[1],
                 feature=feature,
                 match=match,
                 estimate=estimate,
