@@ -43,6 +43,17 @@ def film(mm):
     return {"film": (0xA405, SHORT, mm)}
 
 
+def zoom(ratio):
+    return {"zoom": (0xA404, RATIONAL, (round(100 * ratio), 100))}
+
+
+def sensor(mm, width=36, height=24):
+    """A lens of `mm` on a sensor of this size, of 3200 x 2400 pixels."""
+    return {"f": (0x920A, RATIONAL, (round(10 * mm), 10)), "unit": (0xA210, SHORT, 4),
+            "x": (0xA20E, RATIONAL, (round(1000 * 3200 / width), 1000)),
+            "y": (0xA20F, RATIONAL, (round(1000 * 2400 / height), 1000)), **size(3200, 2400)}
+
+
 def size(width, height):
     return {"width": (0xA002, LONG, width), "height": (0xA003, LONG, height)}
 
@@ -146,6 +157,74 @@ class Exif(cli.CliTest):
         self.assert_refused(done, "no camera is known: a.png was cropped", "--focal-35mm")
         self.a, self.b = self.photographs(exif(**film(32), **size(3000, 4000)))  # turned since
         self.succeed(self.reconstruct(camera=False))
+
+    def test_what_a_digital_zoom_leaves_open_is_in_the_sigma_and_said(self):
+        focal, middle = 20, 20 * math.sqrt(1.6)
+        sigma = math.hypot(0.1, math.log(1.6) / 2)
+        self.a, self.b = self.photographs(exif(**film(focal), **zoom(1.6)))
+        done = self.succeed(self.reconstruct(camera=False))
+        self.assertIn(b"25.3 mm (35 mm equivalent) from EXIF, known to 26 % only; --camera is "
+                      b"better; a.png was taken with a digital zoom of 1.6, which the 20 mm in its "
+                      b"EXIF data may or may not contain; b.png was", done.stdout)
+        found = self.result()
+        self.assertAlmostEqual(found["cameras"][0]["focal_35mm"], middle)
+        self.assertGreater(found["focal_length"]["sigma"], 0.3 * sigma)
+        self.assertTrue(found["focal_length"]["uncertain"])
+        self.succeed(self.reconstruct("--focal-35mm", f"{middle:.17g}", "--focal-sigma",
+                                      f"{sigma:.17g}", camera=False))
+        given = self.result()
+        for key in ("R", "t", "covariance", "verdict", "focal_length"):
+            self.assertEqual(found[key], given[key], key)
+        # --focal-sigma comes before what EXIF says.
+        self.succeed(self.reconstruct("--focal-sigma", "0", camera=False))
+        self.assertIsNone(self.result()["focal_length"])
+
+    def test_what_two_readings_of_the_focal_length_mean_together(self):
+        of_film = math.hypot(36, 24) / math.hypot(36, 27)  # of 4:3, as the images are
+        cases = {  # EXIF: focal length, words of the note
+            "no zoom": (film(32) | zoom(1), 32, None),
+            "not used": (film(32) | zoom(0), 32, None),
+            "slight": (film(32) | zoom(1.04), 32, None),
+            "wide": (film(32) | zoom(0.5), 32 * math.sqrt(0.5), "digital zoom of 0.5"),
+            "agree": (film(32) | sensor(33, 36, 27), 32, None),
+            "contained": (film(32) | sensor(20, 36, 27) | zoom(1.6), 32, None),
+            "lens alone": (sensor(32, 36, 27) | zoom(1.5), 32 * of_film * math.sqrt(1.5),
+                           "digital zoom of 1.5"),
+            "contradict": (film(32) | sensor(50, 36, 27), math.sqrt(32 * 50 * of_film),
+                           "contradict each other, 32 mm"),
+            "both lack it": (film(32) | sensor(33, 36, 27) | zoom(1.5), 32 * math.sqrt(1.5),
+                             "digital zoom of 1.5"),
+            "rubbish": (film(65535) | sensor(33, 36, 27), 33 * of_film, None),
+            "of the lens": (film(4) | sensor(33, 36, 27), 33 * of_film, None),
+        }
+        for case, (tags, focal, words) in cases.items():
+            with self.subTest(case=case):
+                self.a, self.b = self.photographs(exif(**tags))
+                done = self.succeed(self.reconstruct(camera=False))
+                self.assertEqual(b"known to" in done.stdout, words is not None)
+                self.assertIn((words or "").encode(), done.stdout)
+                found = self.result()["cameras"][0]["focal_35mm"]
+                self.assertAlmostEqual(found, focal, delta=1e-3)
+                self.a.write_bytes(png(WIDTH, HEIGHT, cli.stereo_pair()[0]))
+                self.b.write_bytes(png(WIDTH, HEIGHT, cli.stereo_pair()[1]))
+
+    def test_readings_that_are_too_far_apart_are_none(self):
+        for tags, words in ((film(32) | zoom(4), "a.png was taken with a digital zoom of 4, which"),
+                            (film(30) | sensor(100, 36, 27), "30 mm for 35 mm film and 96"),
+                            (film(4), "none of 8 to 10000 mm"),
+                            (film(65535), "none of 8 to 10000 mm")):
+            with self.subTest(words=words):
+                a, b = (self.write(p.name, with_exif(png(WIDTH, HEIGHT, image), exif(**tags)))
+                        for p, image in zip((self.a, self.b), cli.stereo_pair()))
+                self.assert_refused(self.reconstruct(a=a, b=b, camera=False), words,
+                                    "--focal-35mm")
+
+    def test_another_size_than_exif_says_is_said_to_be_taken_as_a_resize(self):
+        self.a, self.b = self.photographs(exif(**film(32), **size(4000, 3000)))
+        done = self.succeed(self.reconstruct(camera=False))
+        self.assertIn(b"a.png is taken as made smaller or larger, not as cropped: EXIF says "
+                      b"4000x3000", done.stdout)
+        self.assertEqual(self.result()["cameras"][0]["focal_35mm"], 32)
 
     def test_a_focal_length_without_the_size_of_the_sensor_is_said_to_lack_that(self):
         image = self.write("f.png", with_exif(self.a.read_bytes(),

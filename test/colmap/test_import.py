@@ -1,6 +1,7 @@
 """Tests of twoview colmap import and model: models as reference poses, databases as input, and
 results written as models."""
 
+import contextlib
 import json
 import os
 import shutil
@@ -171,6 +172,7 @@ def write_database(path, pixels, columns=6, with_matches=True, descriptors=None)
         camera = pycolmap.Camera(
             model="PINHOLE", width=WIDTH, height=HEIGHT, params=[FX, FY, CX + 0.5, CY + 0.5]
         )
+        camera.has_prior_focal_length = True
         camera.camera_id = database.write_camera(camera)
         for i in range(2):
             image_id = database.write_image(
@@ -194,6 +196,54 @@ def views_of(points):
         tv.camera_project_points(camera, np.ascontiguousarray(p))[0]
         for p in (points, points @ R.T + t)
     ]
+
+
+@pytest.mark.parametrize("schema", ["4", "3.8"])
+def test_a_focal_length_that_colmap_guessed_is_no_truth(exported, models, tmp_path, schema, call):
+    import sqlite3
+    path = tmp_path / "x.db"
+    shutil.copy(exported[schema], path)
+    guess = np.array([1.3 * FX, 1.3 * FY, CX + 0.5, CY + 0.5])
+
+    def errors(flag, *options):
+        with contextlib.closing(sqlite3.connect(path)) as database:
+            database.execute("UPDATE cameras SET params = ?, prior_focal_length = ?",
+                             (guess.tobytes(), flag))
+            database.commit()
+        arguments = ("import", "--database", path, "--model", models["text"], "-o", tmp_path / "o")
+        assert call(*arguments, *options)[0] == 0
+        report = json.loads((tmp_path / "o" / "report.json").read_text())
+        return report, np.median([pair["rotation_error_deg"] for pair in report["pairs"]])
+
+    report, error = errors(0)
+    assert report["guessed_focal_lengths"] == list(NAMES) and error < 0.5
+    assert all(pair["focal_sigma"] == [0.3, 0.3] for pair in report["pairs"])
+    exact, worse = errors(1)  # somebody gave it: it is the truth, however wrong
+    assert exact["guessed_focal_lengths"] == [] and worse > 1.5
+    assert all(pair["focal_sigma"] == [0, 0] for pair in exact["pairs"])
+    # What the user states comes before the flag, in both directions.
+    assert errors(0, "--focal-sigma", "0")[1] == worse and errors(1, "--focal-sigma", "0.3")[1] == error
+    assert errors(0, "--focal-sigma0", "0", "--focal-sigma1", "0")[1] == worse
+    (tmp_path / "camera.yaml").write_text(OPENCV_CAMERA)
+    given, best = errors(0, "--camera", tmp_path / "camera.yaml")
+    assert given["guessed_focal_lengths"] == [] and best < 0.3
+
+
+def test_the_summary_says_what_counts_as_guessed(exported, models, tmp_path, call, refuse):
+    import sqlite3
+    shutil.copy(exported["3.8"], tmp_path / "x.db")
+    arguments = ("import", "--database", tmp_path / "x.db", "-o", tmp_path / "o")
+    assert "guessed" not in call(*arguments)[1]
+    with contextlib.closing(sqlite3.connect(tmp_path / "x.db")) as database:
+        database.execute("UPDATE cameras SET prior_focal_length = 0")
+        database.commit()
+    assert "of 4 images was guessed (prior_focal_length 0) and counts as known to 30 %" in call(
+        *arguments)[1]
+    assert "counts as known to 20 %" in call(*arguments, "--focal-sigma", "0.2")[1]
+    refuse("--focal-sigma", *arguments, "--focal-sigma", "0.6")
+    # A model has no flag.
+    assert "a model does not say which were guessed" in call(
+        "import", "--model", models["text"], "-o", tmp_path / "m")[1]
 
 
 @pytest.mark.parametrize("columns", [2, 4, 6])
@@ -303,6 +353,17 @@ def test_pycolmap_reads_a_result_and_reprojects_it(result):
     )
 
 
+def test_a_focal_length_for_film_is_uncertain_in_a_model(photographs, tmp_path, call):
+    images = photographs / "images"
+    focal = 1.1 * np.sqrt(FX * FY) * np.hypot(36, 24) / np.hypot(WIDTH, HEIGHT)
+    arguments = ("model", images / "a.png", images / "c.png", "--focal-35mm", f"{focal:.3f}")
+    written = []
+    for number, sigma in enumerate(((), ("--focal-sigma0", "0", "--focal-sigma1", "0"))):
+        assert call(*arguments, "-o", tmp_path / str(number), *sigma)[0] == 0
+        written.append(pycolmap.Reconstruction(tmp_path / str(number)).cameras[1].params[0])
+    assert abs(written[0] / FX - 1) < 0.06 and abs(written[1] / FX - 1) > 0.06
+
+
 def test_a_model_has_the_camera_that_its_points_are_of(bend, tmp_path, call):
     images = bend / "images"
     status, out, _ = call(
@@ -332,7 +393,7 @@ def test_a_model_of_a_focal_length_and_of_smaller_images(photographs, tmp_path, 
     images = [photographs / "images" / name for name in ("a.png", "c.png")]
     focal_35mm = FX * np.hypot(36, 24) / np.hypot(WIDTH, HEIGHT)
     status, _, err = call("model", *images, "--focal-35mm", focal_35mm, "--resize", WIDTH // 2,
-                          "-o", tmp_path, "--quiet")
+                          "--focal-sigma0", 0, "--focal-sigma1", 0, "-o", tmp_path, "--quiet")
     assert status == 0, err
     found = read_model(tmp_path)
     camera = next(iter(found.cameras.values()))

@@ -13,7 +13,11 @@ namespace cli {
 namespace {
 
 constexpr double kSameRatio = 0.01;
-constexpr double kShortest = 1, kLongest = 10000;  // what --focal-35mm accepts, millimetres
+// The focal lengths of lenses that show straight lines straight, and of telescopes, millimetres as
+// for 35 mm film. What is beyond them is no focal length, such as 65535 or that of the lens itself.
+constexpr double kShortest = 8, kLongest = 10000;
+// The relative standard deviation of a focal length without contradiction, and the largest one.
+constexpr double kSigma = 0.1, kMostSigma = 0.5;
 
 struct Unref {
   void operator()(ExifData* data) const { exif_data_unref(data); }
@@ -91,10 +95,45 @@ double from_sensor(ExifData* data, double full_width, double full_height) {
   return focal * std::hypot(36.0, 24.0) / diagonal;
 }
 
+bool is_plausible(double focal) { return focal >= kShortest && focal <= kLongest; }
+
+bool differ(double a, double b) { return std::abs(std::log(a / b)) > kSigma; }
+
+// What the readings may mean. of_film and of_sensor: focal lengths as for 35 mm film, 0 where there
+// is none. zoom: DigitalZoomRatio, the inverse of the part of the sensor that the picture shows.
+// Some cameras multiply their focal length for 35 mm film by it, others do not.
+ExifFocal combined(double of_film, double of_sensor, double zoom) {
+  const bool has_both = of_film > 0 && of_sensor > 0;
+  const double stated = of_film > 0 ? of_film : of_sensor;
+  ExifFocal found{stated, kSigma};
+  if (has_both && !differ(of_film, of_sensor * zoom)) return found;  // the film's contains it
+  const bool contradict = has_both && differ(of_film, of_sensor);
+  if (!contradict && !differ(zoom, 1)) return found;
+  double shortest = contradict ? std::min(of_film, of_sensor) : stated;
+  double longest = contradict ? std::max(of_film, of_sensor) : stated;
+  (zoom > 1 ? longest : shortest) *= zoom;
+  char text[160];
+  if (contradict)
+    std::snprintf(text, sizeof text,
+                  "has two focal lengths in EXIF data that contradict each other, %.4g mm for 35 mm "
+                  "film and %.4g mm by the size of its sensor",
+                  of_film, of_sensor);
+  else
+    std::snprintf(text, sizeof text,
+                  "was taken with a digital zoom of %.3g, which the %.4g mm in its EXIF data may or "
+                  "may not contain",
+                  zoom, stated);
+  found.focal_35mm = std::sqrt(shortest * longest);
+  found.sigma = std::hypot(kSigma, 0.5 * std::log(longest / shortest));
+  if (found.sigma > kMostSigma) return {0, 0, text};
+  found.doubt = text;
+  return found;
+}
+
 }  // namespace
 
 std::string focal_option(const ExifFocal& exif) {
-  if (!(exif.focal_35mm > 0)) return "--focal-35mm";
+  if (!(exif.focal_35mm > 0) || !exif.doubt.empty()) return "--focal-35mm";
   char text[48];
   std::snprintf(text, sizeof text, "--focal-35mm %.4g (by EXIF)", exif.focal_35mm);
   return text;
@@ -117,21 +156,31 @@ int exif_turn_deg(std::string_view bytes) {
 ExifFocal exif_focal(std::string_view bytes, int width, int height) {
   constexpr const char* none = "has no focal length in EXIF data";
   const Data data = parsed(bytes);
-  if (!data || width < 1 || height < 1) return {0, none};
+  if (!data || width < 1 || height < 1) return {0, 0, none};
   const double full_width = number_of(data.get(), EXIF_TAG_PIXEL_X_DIMENSION);
   const double full_height = number_of(data.get(), EXIF_TAG_PIXEL_Y_DIMENSION);
   const double of_lens = number_of(data.get(), EXIF_TAG_FOCAL_LENGTH);
-  double focal = number_of(data.get(), EXIF_TAG_FOCAL_LENGTH_IN_35MM_FILM);
-  if (!(focal > 0 || of_lens > 0)) return {0, none};
+  double of_film = number_of(data.get(), EXIF_TAG_FOCAL_LENGTH_IN_35MM_FILM);
+  if (!(of_film > 0 || of_lens > 0)) return {0, 0, none};
   if (is_cropped(full_width, full_height, width, height))
-    return {0,
+    return {0, 0,
             "was cropped or is of another shape than its EXIF data say, so that their focal "
             "length is not of it"};
-  if (!(focal > 0)) focal = from_sensor(data.get(), full_width, full_height);
-  if (!(focal > 0))
-    return {0, "has the focal length of its lens in EXIF data, but not the size of its sensor"};
-  if (!(focal >= kShortest && focal <= kLongest)) return {0, none};
-  return {focal, ""};
+  double of_sensor = from_sensor(data.get(), full_width, full_height);
+  if (!(of_film > 0 || of_sensor > 0))
+    return {0, 0, "has the focal length of its lens in EXIF data, but not the size of its sensor"};
+  if (!is_plausible(of_film)) of_film = 0;
+  if (!is_plausible(of_sensor)) of_sensor = 0;
+  if (!(of_film > 0 || of_sensor > 0))
+    return {0, 0, "has a focal length in EXIF data that is none of 8 to 10000 mm for 35 mm film"};
+  const double zoom = number_of(data.get(), EXIF_TAG_DIGITAL_ZOOM_RATIO);
+  ExifFocal found = combined(of_film, of_sensor, zoom > 0 ? zoom : 1);  // 0: there was none
+  if (full_width > 0 && full_height > 0 &&
+      std::max(full_width, full_height) != std::max(width, height))
+    found.assumed = "is taken as made smaller or larger, not as cropped: EXIF says " +
+                    std::to_string(static_cast<int>(full_width)) + "x" +
+                    std::to_string(static_cast<int>(full_height));
+  return found;
 }
 
 }  // namespace cli

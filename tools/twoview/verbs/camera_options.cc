@@ -1,5 +1,6 @@
 #include "verbs/camera_options.h"
 
+#include <algorithm>
 #include <cstdio>
 
 #include "base/error.h"
@@ -9,8 +10,18 @@
 namespace cli {
 namespace {
 
-ImageCamera film(ImageCamera::Source source, double focal_35mm, const ImageFacts& image) {
-  return {source, film_camera(focal_35mm, image.width, image.height), kFilm, "", focal_35mm, {}};
+ImageCamera film(double focal_35mm, const ImageFacts& image) {
+  const tv_camera camera = film_camera(focal_35mm, image.width, image.height);
+  return {ImageCamera::kFocal, camera, kFilm, "", focal_35mm, {}, ""};
+}
+
+ImageCamera by_exif(const ImageFacts& image) {
+  ImageCamera found = film(image.exif.focal_35mm, image);
+  found.source = ImageCamera::kExif;
+  found.sigmas.focal = image.exif.sigma;
+  for (const std::string& words : {image.exif.doubt, image.exif.assumed})
+    if (!words.empty()) found.doubt += "; " + image.name + " " + words;
+  return found;
 }
 
 }  // namespace
@@ -53,7 +64,7 @@ ImageCameras CameraOptions::cameras_of(const ImageFacts& image0, const ImageFact
     for (size_t i = 0; i < 2; ++i) {
       const tv_camera camera = read[i]->of(images[i]->name);
       const int width = images[i]->width, height = images[i]->height;
-      cameras[i] = {ImageCamera::kFile, camera, read[i]->sigmas, given[i], 0, {}};
+      cameras[i] = {ImageCamera::kFile, camera, read[i]->sigmas, given[i], 0, {}, ""};
       if (!read[i]->note().empty()) cameras[i].notes.push_back(read[i]->note());
       if (width == 0) continue;
       cameras[i].camera = fitted(camera, given[i], width, height, images[i]->name, scales_camera);
@@ -61,27 +72,30 @@ ImageCameras CameraOptions::cameras_of(const ImageFacts& image0, const ImageFact
       if (!scaled.empty()) cameras[i].notes.push_back(scaled);
     }
   } else if (focal_35mm > 0) {
-    for (size_t i = 0; i < 2; ++i) cameras[i] = film(ImageCamera::kFocal, focal_35mm, *images[i]);
+    for (size_t i = 0; i < 2; ++i) cameras[i] = film(focal_35mm, *images[i]);
   } else if (image0.exif.focal_35mm > 0 && image1.exif.focal_35mm > 0) {
-    for (size_t i = 0; i < 2; ++i)
-      cameras[i] = film(ImageCamera::kExif, images[i]->exif.focal_35mm, *images[i]);
+    for (size_t i = 0; i < 2; ++i) cameras[i] = by_exif(*images[i]);
   }
   return cameras;
 }
 
 std::string exif_note(const ImageCameras& cameras) {
   if (cameras[0].source != ImageCamera::kExif) return "";
-  char text[160];
+  char text[160], known[48] = "";
   const double f0 = cameras[0].focal_35mm, f1 = cameras[1].focal_35mm;
+  const double sigma = std::max(cameras[0].sigmas.focal, cameras[1].sigmas.focal);
+  if (sigma > kFilm.focal)
+    std::snprintf(known, sizeof known, ", known to %.0f %% only", 100 * sigma);
   if (f0 == f1)
     std::snprintf(text, sizeof text,
-                  "focal length %.4g mm (35 mm equivalent) from EXIF; --camera is better", f0);
+                  "focal length %.4g mm (35 mm equivalent) from EXIF%s; --camera is better", f0,
+                  known);
   else
     std::snprintf(text, sizeof text,
-                  "focal lengths %.4g and %.4g mm (35 mm equivalent) from EXIF; --camera0 and "
+                  "focal lengths %.4g and %.4g mm (35 mm equivalent) from EXIF%s; --camera0 and "
                   "--camera1 are better",
-                  f0, f1);
-  return text;
+                  f0, f1, known);
+  return text + cameras[0].doubt + cameras[1].doubt;
 }
 
 nlohmann::ordered_json cameras_json(const ImageCameras& cameras) {

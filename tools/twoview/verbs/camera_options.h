@@ -21,6 +21,7 @@ struct ImageCamera {
   std::string file;                // the camera file as given
   double focal_35mm = 0;           // millimetres, where source is kFocal or kExif
   std::vector<std::string> notes;  // of the file: what was left out, and that it was scaled
+  std::string doubt;               // what may be wrong with EXIF's focal length: "; a.jpg was ..."
 };
 using ImageCameras = std::array<ImageCamera, 2>;
 

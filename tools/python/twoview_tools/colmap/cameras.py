@@ -22,6 +22,12 @@ def read_camera(path):
         return _camera(formats.read_camera(path))
 
 
+def read_sigmas(path):
+    """How sure the calibration of a camera file is."""
+    with refused(path):
+        return tv.read_sigmas(path)
+
+
 def read_camera_set(path):
     """Reads a cameras.yaml as {name: camera}."""
     with refused(path):

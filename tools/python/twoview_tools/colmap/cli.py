@@ -1,6 +1,7 @@
 """The command line of `twoview colmap`."""
 
 import argparse
+import dataclasses
 import json
 import os
 import signal
@@ -43,8 +44,16 @@ def _longer_side(text):
     return value
 
 
+def _focal_sigma(text):
+    value = float(text)
+    if not 0 <= value <= 0.5:
+        raise ValueError
+    return value
+
+
 # argparse names the function in its message: "invalid ... value".
 _focal_35mm.__name__ = "millimetres (1 to 10000, with a decimal point)"
+_focal_sigma.__name__ = "relative deviation (0 to 0.5, with a decimal point)"
 _longer_side.__name__ = "pixels (0 to 16384)"
 
 
@@ -156,7 +165,11 @@ def _add_import(verbs):
     )
     parser.add_argument("--camera", action="append", default=[], metavar="YAML",
                         help="for all images, instead of the database's")
-    settings.add_options(parser, (tv.MatchOptions, tv.EstimateOptions))
+    parser.add_argument("--focal-sigma", type=_focal_sigma, metavar="S",
+                        help="how sure the focal lengths of a database are, relative (default: "
+                             "0.3 where COLMAP guessed them, prior_focal_length 0, else 0)")
+    settings.add_options(parser, (tv.MatchOptions, tv.EstimateOptions),
+                         **settings.SIGMAS_OF_THE_CAMERA)
     parser.set_defaults(run=_import)
 
 
@@ -170,7 +183,8 @@ def _import(arguments):
     if not a.database:
         count = import_model(model, a.output, a.pairs, a.sequential, a.min_common_points)
         _say(a, {"images": len(model.images), "pairs": count},
-             f"{a.output}: {len(model.images)} images, {count} pairs")
+             f"{a.output}: {len(model.images)} images, {count} pairs; the model's focal lengths "
+             f"count as measured: a model does not say which were guessed")
         return EXIT_DONE
     report = import_database(
         a.database,
@@ -182,12 +196,25 @@ def _import(arguments):
         settings.options_of(a, tv.MatchOptions),
         settings.options_of(a, tv.EstimateOptions),
         a.quiet or a.json,
+        lambda sigmas: settings.sigmas_of(a, sigmas),
     )
     posed = sum(row["R"] is not None and row["t"] is not None for row in report["pairs"])
     areas = ", ".join(f"{area:.1f}" for area in report["auc"].values() if area is not None)
     _say(a, report, f"{a.output}/report.json: {report['num_pairs']} pairs, {posed} with a pose"
-                    + (f"; AUC at 5, 10, 20 degrees {areas}" if areas else ""))
+                    + (f"; AUC at 5, 10, 20 degrees {areas}" if areas else "")
+                    + _words_on_guessed(report["guessed_focal_lengths"], a))
     return EXIT_DONE if posed else EXIT_NO_POSE
+
+
+def _words_on_guessed(names, arguments):
+    """Continues the summary: how many images have a focal length that COLMAP guessed, and how sure
+    it counts."""
+    if not names:
+        return ""
+    from .importer import GUESSED
+    sigma = settings.sigmas_of(arguments, [GUESSED] * 2)["focal_sigma0"]
+    return (f"; the focal length of {len(names)} images was guessed (prior_focal_length 0) and "
+            f"counts as known to {100 * sigma:g} % (--focal-sigma, or --camera)")
 
 
 def _add_model(verbs):
@@ -205,12 +232,12 @@ def _add_model(verbs):
     _add_mask(parser)
     parser.add_argument("-o", "--output", required=True, metavar="DIR",
                         help="of cameras.txt, images.txt, points3D.txt and trajectory.tum")
-    settings.add_options(parser)
+    settings.add_options(parser, **settings.SIGMAS_OF_THE_CAMERA)
     parser.set_defaults(run=_model)
 
 
 def _model(arguments):
-    from .cameras import film_camera, read_camera
+    from .cameras import film_camera, read_camera, read_sigmas
     from .images import read_luma
     from .model import text_model
     from .output import write_files
@@ -221,16 +248,21 @@ def _model(arguments):
         raise BadInput("model needs either --camera or --focal-35mm")
     if a.focal_35mm:
         cameras = [film_camera(a.focal_35mm, *read_luma(path).shape[::-1]) for path in a.images]
+        sigmas = [tv.FILM] * 2
     else:
-        cameras = [read_camera(path) for path in (a.camera, a.camera1 or a.camera)]
+        files = (a.camera, a.camera1 or a.camera)
+        cameras, sigmas = [read_camera(path) for path in files], [read_sigmas(path) for path in files]
     names = [os.path.basename(path) for path in a.images]
     if names[0] == names[1]:
         raise BadInput(
             f"both images are called {names[0]}, and a COLMAP model tells images apart by their "
             f"names"
         )
-    pose, model = reconstruct(a.images, names, cameras, *(settings.options_of(a, kind) for kind in (
-        tv.FeatureOptions, tv.MatchOptions, tv.EstimateOptions)), resize=a.resize or 0, mask=a.mask)
+    estimate = dataclasses.replace(settings.options_of(a, tv.EstimateOptions),
+                                   **settings.sigmas_of(a, sigmas))
+    pose, model = reconstruct(a.images, names, cameras, settings.options_of(a, tv.FeatureOptions),
+                              settings.options_of(a, tv.MatchOptions), estimate,
+                              resize=a.resize or 0, mask=a.mask)
     if model is None:
         print(f"twoview: no full pose: {pose.kind.name.lower()}", file=sys.stderr)
         return EXIT_NO_POSE

@@ -170,6 +170,13 @@ def read_cameras(database):
             for camera_id, model, width, height, params in rows}
 
 
+def read_guessed_cameras(database):
+    """The ids of the cameras whose focal length COLMAP guessed from the image's size: the column
+    prior_focal_length is 0. Elsewhere EXIF data or the user gave it."""
+    rows = database.execute("SELECT camera_id FROM cameras WHERE NOT prior_focal_length")
+    return {row[0] for row in rows}
+
+
 def read_images(database):
     """Reads the table `images` as {name: (image_id, camera_id)}."""
     return {name: (image_id, camera_id) for image_id, name, camera_id in

@@ -39,7 +39,8 @@ class Engine:
         return tv.match(self._context(1, 1), descriptors0, descriptors1, self.match_options,
                         keypoints0, keypoints1)
 
-    def estimate(self, camera0, camera1, pixels0, pixels1, ratios=None):
+    def estimate(self, camera0, camera1, pixels0, pixels1, ratios=None, options=None):
+        """tv.estimate_two_view; `options` in place of the engine's own."""
         try:
             return tv.estimate_two_view(
                 self._context(1, 1),
@@ -48,7 +49,7 @@ class Engine:
                 pixels0,
                 pixels1,
                 ratios,
-                self.estimate_options,
+                options or self.estimate_options,
             )
         except tv.StatusError as error:
             raise BadInput(str(error)) from None

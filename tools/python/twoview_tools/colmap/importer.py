@@ -1,5 +1,6 @@
 """Imports COLMAP's models as reference poses, and its features and matches as input."""
 
+import dataclasses
 import json
 import os
 
@@ -8,7 +9,7 @@ import twoview as tv
 
 from ..accuracy import metrics  # pose errors have the definition of the accuracy tables
 from . import database as db
-from .cameras import read_camera, write_camera_set
+from .cameras import read_camera, read_sigmas, write_camera_set
 from .conventions import camera_from_colmap, pixels_from_colmap
 from .engine import Engine
 from .errors import BadInput
@@ -16,6 +17,13 @@ from .output import write_files
 from .pairs import exhaustive, read_pairs, sequential, write_pair
 from .progress import progress
 from .trajectory import write_trajectory
+
+
+# How sure a focal length is that COLMAP guessed: 1.2 times the longer side, 43 mm as for 35 mm film
+# at 3:2. Photographs are taken with 24 to 85 mm as a rule, which is 0.6 below and 0.7 above in the
+# logarithm: two deviations of 0.3.
+GUESSED = tv.CalibrationSigmas(0.3, 0.01)
+EXACT = tv.CalibrationSigmas(0.0, 0.0)
 
 
 def _choose(names, pairs_file, overlap):
@@ -101,7 +109,9 @@ class Features:
     def __init__(self, path, camera_files=()):
         self.path = path
         given = [read_camera(file) for file in camera_files]
+        self._sigmas_given = [read_sigmas(file) for file in camera_files]
         self.pixels, self.descriptors, self.cameras, self.matches = {}, {}, {}, {}
+        self.sigmas = {}  #: CalibrationSigmas by image
         with db.reading(path) as database:
             try:
                 self._read(database, given)
@@ -110,10 +120,13 @@ class Features:
 
     def _read(self, database, given):
         rows = db.read_cameras(database)
+        guessed = set() if given else db.read_guessed_cameras(database)
         names = {}
         for name, (image_id, camera_id) in db.read_images(database).items():
             names[image_id] = name
             self.cameras[name] = given[0] if given else _camera(rows[camera_id], f"image {name}")
+            self.sigmas[name] = (self._sigmas_given[0] if given else
+                                 GUESSED if camera_id in guessed else EXACT)
             self.pixels[name] = pixels_from_colmap(db.read_keypoints(database, self.path, image_id))
             self.descriptors[name] = db.read_descriptors(database, self.path, image_id)
         for id0, id1, matches in db.read_matches(database, self.path):
@@ -126,6 +139,10 @@ class Features:
             ):
                 raise BadInput(f"{self.path}: a match of {name0} and {name1} has no keypoint")
             self.matches[name0, name1] = matches
+
+    def guessed(self):
+        """The names of the images whose focal length COLMAP guessed."""
+        return sorted(name for name, sigmas in self.sigmas.items() if sigmas is GUESSED)
 
     def matches_of(self, name0, name1, engine):
         """(matches (n, 2), their ratios or None) in this order of the names. The database's matches
@@ -141,11 +158,16 @@ class Features:
         return np.column_stack([found["idx0"], found["idx1"]]), found["ratio"].copy()
 
 
-def _pair_report(name0, name1, features, engine, truth):
+def _sigmas_as_known(sigmas):
+    return {f"{part}_sigma{i}": value for i, known in enumerate(sigmas)
+            for part, value in known._asdict().items()}
+
+
+def _pair_report(name0, name1, features, engine, truth, options):
     matches, ratios = features.matches_of(name0, name1, engine)
     result, inliers = engine.estimate(
         features.cameras[name0], features.cameras[name1], features.pixels[name0][matches[:, 0]],
-        features.pixels[name1][matches[:, 1]], ratios)
+        features.pixels[name1][matches[:, 1]], ratios, options)
     row = {"name0": name0, "name1": name1}
     errors = (
         metrics.pose_error(result.R, result.t, *truth)
@@ -168,6 +190,7 @@ def _pair_report(name0, name1, features, engine, truth):
             "config": result.kind.name.lower(),
             "verdict": result.verdict.name.lower(),
             "time_ms": None,
+            "focal_sigma": [options.focal_sigma0, options.focal_sigma1],
         }
     )
     row.update({key: None if value is None else np.ravel(value).tolist()
@@ -186,11 +209,13 @@ def import_database(
     match=None,
     estimate=None,
     quiet=False,
+    sigmas_of=None,
 ):
     """Estimates from a database's features and matches, and writes report.json in the form of
     `twoview evaluate`. Without a pairs file and an overlap it takes the pairs that have matches in
     the database, or all pairs if none has. The truth is that of `model`, else that of the pairs
-    file."""
+    file. sigmas_of: from the two cameras' CalibrationSigmas to the standard deviations of
+    EstimateOptions, {name: value}; None: as the cameras say."""
     features = Features(path, camera_files)
     if pairs_file or overlap or not features.matches:
         pairs = _choose(list(features.pixels), pairs_file, overlap)
@@ -200,12 +225,16 @@ def import_database(
     most = max([len(pixels) for pixels in features.pixels.values()] + [1])
     engine = Engine(tv.FeatureOptions(max_keypoints=most), match, estimate,
                     max_matches=max([len(m) for m in features.matches.values()] + [most]))
+    estimate = estimate or tv.EstimateOptions()
+    sigmas_of = sigmas_of or _sigmas_as_known
     rows = []
     for pair in progress(pairs, "pair", quiet):
         truth = None if pair.R is None else (pair.R, pair.t)
         if model and pair.name0 in model.images and pair.name1 in model.images:
             truth = relative(model.images[pair.name0], model.images[pair.name1])
-        rows.append(_pair_report(pair.name0, pair.name1, features, engine, truth))
+        sigmas = sigmas_of([features.sigmas[name] for name in (pair.name0, pair.name1)])
+        options = dataclasses.replace(estimate, **sigmas)
+        rows.append(_pair_report(pair.name0, pair.name1, features, engine, truth, options))
     report = {
         key: {f"{limit:g}": _auc(rows, error, limit) for limit in metrics.THRESHOLDS_DEG}
         for key, error in (
@@ -214,7 +243,8 @@ def import_database(
         )
     }
     report.update(num_pairs=len(rows), pairs=rows, options={"database": os.path.basename(path)},
-                  seed=(estimate or tv.EstimateOptions()).seed, version=tv.version_string())
+                  guessed_focal_lengths=features.guessed(), seed=estimate.seed,
+                  version=tv.version_string())
     write_files(folder, {"report.json": json.dumps(metrics.finite(report), indent=1) + "\n"})
     return report
 

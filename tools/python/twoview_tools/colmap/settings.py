@@ -14,6 +14,10 @@ MAPPING_KEYPOINTS = 8192
 PRINCIPAL_POINT_SIGMA_OF_A_DATABASE = 0.0
 # Defaults that are automatic in the library have explicit values here, as in the C++ program.
 _EXPLICIT = {"max_keypoints": 2048, "method": tv.Solver.FIVE_POINT}
+# Where the camera says how sure it is: the flags have no number of their own as their default.
+SIGMAS_OF_THE_CAMERA = dict.fromkeys(("focal_sigma0", "focal_sigma1", "center_sigma0",
+                                      "center_sigma1"))
+_FROM_CAMERA = "that of the camera"
 _NOT_HERE = ("gravity0", "gravity1", "gravity_sigma_rad", "reserved")
 
 
@@ -50,13 +54,26 @@ def add_options(parser, kinds=_KINDS, **defaults):
                 group.add_argument(flag, type=_choice(enum), default=enum(default),
                                    metavar="|".join(_words(enum)), help=_spelt(enum(default)))
             else:
-                number = int if default is None else type(default)
+                number = int if field.default is None else type(field.default)
                 group.add_argument(flag, type=number, default=default,
                                    metavar="N" if number is int else "X",
-                                   help="the library's" if default is None else f"{default:g}")
+                                   help="the library's" if field.default is None else
+                                   _FROM_CAMERA if default is None else f"{default:g}")
 
 
 def options_of(arguments, kind):
     """Makes an options object of class `kind` from the values of the command line's flags."""
     return kind(**{field.name: getattr(arguments, field.name) for field in dataclasses.fields(kind)
-                   if hasattr(arguments, field.name)})
+                   if getattr(arguments, field.name, None) is not None})
+
+
+def sigmas_of(arguments, sigmas):
+    """The four standard deviations of EstimateOptions, of two cameras: those that the command line
+    gives, else `sigmas`, a CalibrationSigmas for each camera."""
+    found = {}
+    for i, known in enumerate(sigmas):
+        for part, value in known._asdict().items():
+            given = getattr(arguments, f"{part}_sigma{i}")
+            both = getattr(arguments, f"{part}_sigma", None)
+            found[f"{part}_sigma{i}"] = next(x for x in (given, both, value) if x is not None)
+    return found
