@@ -85,7 +85,8 @@ class tv_estimate_options(Structure):
                 ("gravity1", c_double * 3), ("gravity_sigma_rad", c_double),
                 ("principal_point_sigma", c_double),
                 ("focal_sigma0", c_double), ("focal_sigma1", c_double),
-                ("center_sigma0", c_double), ("center_sigma1", c_double)]
+                ("center_sigma0", c_double), ("center_sigma1", c_double),
+                ("readout_turn_sigma_rad", c_double)]
 
 
 class tv_two_view(Structure):
@@ -107,7 +108,9 @@ class tv_two_view(Structure):
                 ("principal_point_asked_covariance", c_double * 3),
                 ("probability_wrong", c_double), ("agreement", c_double),
                 ("region_shift_rad", c_double), ("num_places", c_int32), ("num_still", c_int32),
-                ("focal_scale", c_double), ("focal_sigma", c_double)]
+                ("focal_scale", c_double), ("focal_sigma", c_double),
+                ("camera_chi2", c_double), ("camera_turn_rad", c_double),
+                ("camera_direction_rad", c_double)]
 
 
 class tv_point(Structure):

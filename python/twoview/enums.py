@@ -103,6 +103,7 @@ class Reason(IntFlag):
     SECOND_MOTION = 1 << 6
     CROWDED_MATCHES = 1 << 7
     REPEATED_STRUCTURE = 1 << 8
+    CAMERA_CONTRADICTED = 1 << 9
 
 
 class Triangulation(IntEnum):

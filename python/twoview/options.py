@@ -84,6 +84,9 @@ class EstimateOptions(_Options):
     focal_sigma1: float = 0.0  #: of camera 1
     center_sigma0: float = 0.0  #: of the principal points, in focal lengths; 0: exact
     center_sigma1: float = 0.0  #: of camera 1
+    #: Standard deviation of a camera's turn while a picture's rows are read, about each axis,
+    #: radians; 0: all rows are exposed at once, and no rolling shutter is tested.
+    readout_turn_sigma_rad: float = 0.02
 
 
 @dataclass(frozen=True)

@@ -308,6 +308,11 @@ class TwoView(Record):
     focal_scale: float
     #: Relative standard deviation of the focal length that the covariance contains. 0: exact.
     focal_sigma: float
+    #: Evidence of the matches against the cameras as given, such as a rolling shutter: above 26.1
+    #: (22.5 with two cameras) they are contradicted. 0: not tested.
+    camera_chi2: float
+    camera_turn_rad: float  #: by how much the rotation would then turn; 0: not contradicted
+    camera_direction_rad: float  #: and the direction move
 
     def __str__(self) -> str:
         verdict = self.verdict.name.lower()
@@ -360,7 +365,8 @@ def _two_view(found: Any) -> TwoView:
         np.array(found.principal_point_shift), found.principal_point_chi2 if asked else None,
         matrix("principal_point_asked_px", asked, 2), covariance, found.probability_wrong,
         found.agreement, found.region_shift_rad, found.num_places, found.num_still,
-        found.focal_scale, found.focal_sigma)
+        found.focal_scale, found.focal_sigma, found.camera_chi2, found.camera_turn_rad,
+        found.camera_direction_rad)
 
 
 def corrected_camera(found: TwoView, camera: Camera) -> Camera:

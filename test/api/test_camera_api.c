@@ -371,6 +371,7 @@ static void test_every_number_has_its_name(void) {
   TEST_ASSERT_EQUAL_STRING("unknown", tv_verdict_string((tv_verdict)3));
   TEST_ASSERT_EQUAL_STRING("low_parallax", tv_reason_string(TV_REASON_LOW_PARALLAX));
   TEST_ASSERT_EQUAL_STRING("repeated_structure", tv_reason_string(TV_REASON_REPEATED_STRUCTURE));
+  TEST_ASSERT_EQUAL_STRING("camera_contradicted", tv_reason_string(TV_REASON_CAMERA_CONTRADICTED));
   TEST_ASSERT_EQUAL_STRING("unknown", tv_reason_string((tv_reason)3));
 }
 

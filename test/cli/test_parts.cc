@@ -200,7 +200,7 @@ void test_each_reason_has_words_and_advice_and_no_reason_none() {
   Outcome outcome;
   tv_two_view_init(&outcome.two_view);
   TEST_ASSERT_TRUE(reasons_in_words(outcome).empty() && advice_on(outcome).empty());
-  for (uint32_t bit = 1; bit <= TV_REASON_REPEATED_STRUCTURE; bit *= 2) {
+  for (uint32_t bit = 1; bit <= TV_REASON_CAMERA_CONTRADICTED; bit *= 2) {
     outcome.two_view.reasons = bit;
     TEST_ASSERT_FALSE(reasons_in_words(outcome).empty());
     TEST_ASSERT_EQUAL_UINT(1, advice_on(outcome).size());

@@ -26,6 +26,7 @@ tv_estimate_options options_of(fuzz::Bytes& bytes) {
     options.focal_sigma1 = bytes.wild(0, 0.5);
     options.center_sigma0 = bytes.wild(0, 0.5);
     options.center_sigma1 = bytes.wild(0, 0.5);
+    options.readout_turn_sigma_rad = bytes.wild(0, 0.5);
   }
   return options;
 }

@@ -30,8 +30,8 @@ LAYOUT(tv_correspondence, 16, ratio, 12);
 LAYOUT(tv_match_options, 16, max_distance, 12);
 LAYOUT(tv_guided_options, 20, neighbourhood_px, 16);
 LAYOUT(tv_camera, 112, k, 48);
-LAYOUT(tv_estimate_options, 136, center_sigma1, 128);
-LAYOUT(tv_two_view, 1016, focal_sigma, 1008);
+LAYOUT(tv_estimate_options, 144, readout_turn_sigma_rad, 136);
+LAYOUT(tv_two_view, 1040, camera_direction_rad, 1032);
 LAYOUT(tv_point, 40, reserved, 36);
 LAYOUT(tv_bundle_options, 24, hold_pose, 20);
 LAYOUT(tv_bundle_result, 256, noise_px, 248);
@@ -158,6 +158,7 @@ static void add_two_view(const tv_two_view *r) {
   add_doubles(&r->probability_wrong, 3); /* and agreement, region_shift_rad */
   add_double(r->focal_scale);
   add_double(r->focal_sigma);
+  add_doubles(&r->camera_chi2, 3); /* and camera_turn_rad, camera_direction_rad */
 }
 
 static void add_points(const tv_point *points, int32_t count) {

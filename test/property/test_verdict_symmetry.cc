@@ -39,9 +39,10 @@ bool same_report(const tv_two_view& a, const tv_two_view& b) {
   return a.kind == b.kind && a.verdict == b.verdict && a.reasons == b.reasons &&
          a.coverage == b.coverage && a.probability_wrong == b.probability_wrong &&
          a.agreement == b.agreement && a.region_shift_rad == b.region_shift_rad &&
-         a.num_places == b.num_places && a.num_matches == b.num_matches &&
-         a.num_inliers == b.num_inliers && a.num_iterations == b.num_iterations &&
-         a.essential_inliers == b.essential_inliers &&
+         a.camera_chi2 == b.camera_chi2 && a.camera_turn_rad == b.camera_turn_rad &&
+         a.camera_direction_rad == b.camera_direction_rad && a.num_places == b.num_places &&
+         a.num_matches == b.num_matches && a.num_inliers == b.num_inliers &&
+         a.num_iterations == b.num_iterations && a.essential_inliers == b.essential_inliers &&
          a.fundamental_inliers == b.fundamental_inliers &&
          a.homography_inliers == b.homography_inliers && a.rotation_inliers == b.rotation_inliers &&
          a.median_parallax_rad == b.median_parallax_rad && a.rms_error_px == b.rms_error_px &&

@@ -120,7 +120,12 @@ typedef enum tv_reason {
      structure. Or matches agree on the opposite direction, at least 4 and a tenth as many as the
      inliers of a clear depth, with more than twice their parallax. tv_reconstruct gives it, too,
      where most inliers have a second place that looks the same. */
-  TV_REASON_REPEATED_STRUCTURE = 1 << 8
+  TV_REASON_REPEATED_STRUCTURE = 1 << 8,
+  /* The matches contradict the cameras as they were given: the rows of a picture were exposed one
+     after another while the camera turned (a rolling shutter), or its principal point or lens is
+     another one. With cameras that the matches do not contradict, the direction would be another
+     one by more than 10 degrees (camera_direction_rad). */
+  TV_REASON_CAMERA_CONTRADICTED = 1 << 9
 } tv_reason;
 
 /* Returns the name of a kind, such as "calibrated" or "planar_or_panoramic", or "unknown" for any
@@ -180,6 +185,14 @@ typedef struct tv_estimate_options {
      focal lengths, [0, 0.5]. 0 (default): they are exact. The covariance grows as for the focal
      length; unlike principal_point_sigma, nothing is moved. */
   double center_sigma0, center_sigma1;
+  /* How far a camera may turn while the sensor reads the rows of a picture, one after another: the
+     standard deviation about each axis, in radians, [0, 0.5]; default 0.02, which is 50 degrees a
+     second in 23 ms. Where the matches contradict cameras that stood still (camera_chi2), the
+     covariance grows by what such a turn, and another principal point, make of the pose, and a pose
+     that would be another one is given TV_REASON_CAMERA_CONTRADICTED. Nothing is corrected. The
+     rows are those of the image as given: of a picture that was turned since, or of a sensor that
+     exposes all rows at once (global shutter), 0 may be stated, which leaves the test out. */
+  double readout_turn_sigma_rad;
 } tv_estimate_options;
 
 /* Writes the default options into a struct of struct_size bytes; null is allowed. Programs call
@@ -299,6 +312,16 @@ typedef struct tv_two_view {
      adjustment in tv_reconstruct leaves it as it is, though its covariance takes the cameras as
      exact. */
   double focal_sigma;
+  /* Evidence of the matches against the cameras as they were given (readout_turn_sigma_rad), or 0
+     where it was not tested: where there is no pose, or it was fitted together with a plane that
+     explains nearly all matches. Above 26.1 (22.5 where camera0 and camera1 differ) the cameras
+     count as contradicted: chi-square with eight (six) degrees of freedom exceeds it in one of a
+     thousand cases, and matches count as a quarter as many, since they share errors. The next two
+     fields are the angles in radians by which the rotation and the direction (of t or of the
+     inverse pose's, whichever moves more) would move with cameras that the matches do not
+     contradict; 0 where they do not contradict the given ones. The covariance contains them. */
+  double camera_chi2;
+  double camera_turn_rad, camera_direction_rad;
 } tv_two_view;
 
 /* Writes zeros into a struct of struct_size bytes, and the size; null is allowed. Programs call

@@ -75,6 +75,7 @@ const char *tv_reason_string(tv_reason reason) {
     case TV_REASON_SECOND_MOTION: return "second_motion";
     case TV_REASON_CROWDED_MATCHES: return "crowded_matches";
     case TV_REASON_REPEATED_STRUCTURE: return "repeated_structure";
+    case TV_REASON_CAMERA_CONTRADICTED: return "camera_contradicted";
     default: return "unknown";
   }
 }

@@ -20,6 +20,9 @@ namespace {
 
 constexpr uint64_t kDefaultSeed = 20130814;  // any other constant would do as well
 
+// 50 degrees a second in 23 ms, a camera in the hand or on a drone and a usual sensor.
+constexpr double kReadoutTurn = 0.02;
+
 constexpr tv_estimate_options kDefaults = {sizeof(tv_estimate_options),
                                            TV_SOLVER_AUTO,
                                            1.0,
@@ -34,12 +37,13 @@ constexpr tv_estimate_options kDefaults = {sizeof(tv_estimate_options),
                                            0,
                                            0,
                                            0,
-                                           0};
+                                           0,
+                                           kReadoutTurn};
 
-// Checks the standard deviations of the cameras, each in [0, 0.5].
+// Checks the standard deviations of the cameras and of their turns, each in [0, 0.5].
 tv_status check_calibration_sigmas(const tv_estimate_options& options) {
-  for (const double sigma :
-       {options.focal_sigma0, options.focal_sigma1, options.center_sigma0, options.center_sigma1}) {
+  for (const double sigma : {options.focal_sigma0, options.focal_sigma1, options.center_sigma0,
+                             options.center_sigma1, options.readout_turn_sigma_rad}) {
     if (!is_finite(sigma)) return TV_ERR_NOT_FINITE;
     if (!(sigma >= 0 && sigma <= 0.5)) return TV_ERR_ARGUMENT;
   }
@@ -199,6 +203,11 @@ __attribute__((noinline)) void pack(const TwoViewProblem& problem, const Matches
     packed.principal_point_chi2 = test.chi2;
     std::memcpy(packed.principal_point_asked_px, test.asked_px, sizeof test.asked_px);
     std::memcpy(packed.principal_point_asked_covariance, test.covariance, sizeof test.covariance);
+  }
+  if (outcome.has_t) {
+    packed.camera_chi2 = outcome.misfit.chi2;
+    packed.camera_turn_rad = outcome.misfit.turn_rad;
+    packed.camera_direction_rad = outcome.misfit.direction_rad;
   }
   packed.coverage = coverage_of(outcome.evidence);
   packed.focal_scale = outcome.focal_scale;

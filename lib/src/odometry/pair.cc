@@ -68,6 +68,7 @@ bool estimate_pair(Odometry* odometry, const tv_keypoint* keypoints0, const tv_k
   tv_estimate_options_init(&options);
   options.seed = odometry->options.seed;
   options.max_iterations = kMostIterations;
+  options.readout_turn_sigma_rad = 0;  // frames confirm each other
   tv_two_view_init(pair->view);
   if (tv_estimate_two_view(odometry->context, &odometry->camera.model, &odometry->camera.model,
                            &pairs, &options, pair->view, pair->is_inlier) != TV_OK) {

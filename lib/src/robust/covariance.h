@@ -6,6 +6,14 @@
 
 namespace tv {
 
+// What the matches say against the cameras as they were given (camera_misfit.h).
+struct CameraMisfit {
+  double chi2 = 0;  // 0 where it was not tested
+  // By how much the pose would turn, and its direction move, with cameras that the matches do not
+  // contradict; 0 where they do not contradict the given ones.
+  double turn_rad = 0, direction_rad = 0;
+};
+
 struct PoseUncertainty {
   double covariance[25];  // in the parameters (w, a, b) of PoseModel
   double noise_px;        // standard deviation of a pixel's coordinate
@@ -16,6 +24,7 @@ struct PoseUncertainty {
   // refined are added, and direction_sigma with the former. With two cameras of uncertain focal
   // length, rotation_sigma and direction_sigma with all of them.
   double sigma_rad, direction_sigma_rad;
+  CameraMisfit misfit;  // in the covariance; of a pose that was fitted with a plane not tested
 };
 
 // An upper bound of the standard deviations of the rotation and of the direction about any axis:

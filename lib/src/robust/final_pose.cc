@@ -10,6 +10,7 @@
 #include "geometry/sampson.h"
 #include "geometry/transfer.h"
 #include "robust/calibration.h"
+#include "robust/camera_misfit.h"
 #include "robust/correlation.h"
 #include "robust/estimators.h"
 #include "robust/ldlt.h"
@@ -337,6 +338,7 @@ bool uncertainty_of(const PoseRefiner& f, const Pose& pose, PoseUncertainty* unc
     }
     add_calibration(f.problem, slopes, variance, false, all);
   }
+  add_camera_misfit(f, listed.count, pose, listed.loss, &uncertainty->misfit, all);
   if (gravity.known) {
     for (double* c : {noise, shared, all}) add_gravity_information(gravity, pose.R, c);
   }
@@ -375,6 +377,7 @@ int refine_on_plane(const PoseRefiner& f, const Mat3& H, const Vec3& mean_ray0, 
   for (int k = 0; k < num; ++k) {
     if (!fit->certain[k]) continue;
     PoseUncertainty& uncertainty = fit->uncertainty[k];
+    uncertainty.misfit = CameraMisfit{};
     double *const noise = uncertainty.covariance, shared[25], all[25];
     std::copy(noise, noise + 25, shared);
     add_correlation(f, count, twins[k], loss, uncertainty, shared);

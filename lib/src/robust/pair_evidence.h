@@ -29,6 +29,9 @@ struct Evidence {
   double sigma_rad = kUnknown;   // the largest standard deviation of rotation and direction
   // The stated standard deviation of the direction, without what the calibration adds to it.
   double direction_sigma_rad = kUnknown;
+  // By how much the direction would move with cameras that the matches do not contradict; 0 where
+  // they do not contradict the given ones (camera_misfit.h).
+  double misfit_direction_rad = 0;
   double median_parallax_rad = 0;  // median parallax of the inliers
   double pixel_angle_rad = 0;      // the parallax that a pixel of noise in both images makes
   // By how much the rotation turns when the inliers of one region are left out; at most kPi.

@@ -2,6 +2,7 @@
 // (finish.cc), and the data that they pass on.
 #pragma once
 
+#include "robust/covariance.h"
 #include "robust/principal_point.h"
 #include "robust/verdict.h"
 
@@ -39,6 +40,7 @@ struct TwoViewOutcome {
   double focal_scale = 0;                   // of their focal lengths; 0 where they are as given
   double focal_sigma = 0;                   // its relative standard deviation, refined or given
   PrincipalPointTest principal_point_test;  // of a calibrated pose
+  CameraMisfit misfit;                      // of a pose that was tested
   double rms_error_px = 0;
   uint8_t* inlier = nullptr;  // one flag for each match, repeats included
 };

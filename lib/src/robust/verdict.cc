@@ -64,6 +64,15 @@ bool crowded_matches(const Evidence& e) {
          (has_full_pose(e) && (nearest < 3 * e.threshold_px || e.region_shift_rad > kMostShift));
 }
 
+// CAMERA_CONTRADICTED: the matches contradict the cameras as they were given, and with cameras that
+// they do not contradict the direction would be another one by what counts as wrong, 10 degrees. A
+// smaller difference is in the covariance. So is one of the rotation: a turn while the rows are read
+// moves it by a degree or two, and more is asked for only by long lenses, which leave it open
+// (docs/decisions/0053-camera-contradicted.md).
+bool camera_contradicted(const Evidence& e) {
+  return has_full_pose(e) && e.misfit_direction_rad > 10 * kPi / 180;
+}
+
 // The points lie as on a lattice: of the neighbours of a point, more have another point opposite
 // than chance explains, by 3.3 standard deviations in the mean of both images. Where no second
 // model was found, the inliers alone were examined, and more than half of their neighbours must
@@ -82,6 +91,7 @@ uint32_t reasons_of(const Evidence& e) {
   if (e.kind == TV_KIND_DEGENERATE) return reasons;
   if (low_parallax(e)) reasons |= TV_REASON_LOW_PARALLAX;
   if (crowded_matches(e)) reasons |= TV_REASON_CROWDED_MATCHES;
+  if (camera_contradicted(e)) reasons |= TV_REASON_CAMERA_CONTRADICTED;
   // Two motions of the plane explain the matches about equally well; both are reported.
   if (e.has_alternative) reasons |= TV_REASON_TWO_PLANAR_SOLUTIONS;
   // These two kinds are reasons by themselves: the translation is not determined, and so there is
@@ -133,8 +143,8 @@ void doubt(tv_reason reason, tv_two_view* estimate) {
 }
 
 // Guided matching finds matches where the first estimate has their epipolar lines: their agreement
-// with it is no evidence for it, and so the verdict, the reasons and the test of the principal
-// point stay those of the first. The second estimate is the more accurate one and replaces the
+// with it is no evidence for it, and so the verdict, the reasons and the tests of the cameras
+// stay those of the first. The second estimate is the more accurate one and replaces the
 // first, unless it is of another kind, has fewer inliers, is judged worse, or has a second motion
 // of the plane where the first has none (or the reverse): then the matches that were added
 // contradict it.
@@ -150,6 +160,9 @@ bool takes_guided_estimate(const tv_two_view& first, tv_two_view* again) {
   again->agreement = first.agreement;
   again->region_shift_rad = first.region_shift_rad;
   again->num_places = first.num_places;
+  again->camera_chi2 = first.camera_chi2;
+  again->camera_turn_rad = first.camera_turn_rad;
+  again->camera_direction_rad = first.camera_direction_rad;
   again->principal_point_chi2 = first.principal_point_chi2;
   std::copy(first.principal_point_asked_px, first.principal_point_asked_px + 2,
             again->principal_point_asked_px);

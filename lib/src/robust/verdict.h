@@ -24,7 +24,7 @@ double coverage_of(const Evidence& evidence);
 void doubt(tv_reason reason, tv_two_view* estimate);
 
 // Whether the estimate with the matches of guided matching replaces the first one. Where it does,
-// it is given the first one's verdict, reasons and test of the principal point.
+// it is given the first one's verdict, reasons and tests of the cameras.
 bool takes_guided_estimate(const tv_two_view& first, tv_two_view* again);
 
 }  // namespace tv

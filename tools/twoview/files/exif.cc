@@ -114,15 +114,17 @@ ExifFocal combined(double of_film, double of_sensor, double zoom) {
   (zoom > 1 ? longest : shortest) *= zoom;
   char text[160];
   if (contradict)
-    std::snprintf(text, sizeof text,
-                  "has two focal lengths in EXIF data that contradict each other, %.4g mm for 35 mm "
-                  "film and %.4g mm by the size of its sensor",
-                  of_film, of_sensor);
+    std::snprintf(
+        text, sizeof text,
+        "has two focal lengths in EXIF data that contradict each other, %.4g mm for 35 mm "
+        "film and %.4g mm by the size of its sensor",
+        of_film, of_sensor);
   else
-    std::snprintf(text, sizeof text,
-                  "was taken with a digital zoom of %.3g, which the %.4g mm in its EXIF data may or "
-                  "may not contain",
-                  zoom, stated);
+    std::snprintf(
+        text, sizeof text,
+        "was taken with a digital zoom of %.3g, which the %.4g mm in its EXIF data may or "
+        "may not contain",
+        zoom, stated);
   found.focal_35mm = std::sqrt(shortest * longest);
   found.sigma = std::hypot(kSigma, 0.5 * std::log(longest / shortest));
   if (found.sigma > kMostSigma) return {0, 0, text};

@@ -91,6 +91,9 @@ std::vector<Option> table(Options& o) {
       {"principal-point-sigma", kEstimate, &e.principal_point_sigma, 0, 0.1, closed,
        "how far the principal point may be moved: standard deviation in focal lengths, such as "
        "0.01; 0: it is where the camera file has it"},
+      {"readout-turn-sigma-rad", kEstimate, &e.readout_turn_sigma_rad, 0, 0.5, closed,
+       "how far the camera may turn while it reads the rows of a picture (rolling shutter): "
+       "standard deviation in radians; 0: it exposes all rows at once"},
       {"guided-matching", kEstimate, &o.guided_matching, 0, 1, closed,
        "1: match again along the epipolar lines, and estimate from all matches"},
       {"align-matches", kEstimate, &o.align_matches, 0, 1, closed,

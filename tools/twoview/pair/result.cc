@@ -47,6 +47,10 @@ const Phrase kReasons[] = {
      "show texture in other parts of the pictures, or try --cell-px 32"},
     {TV_REASON_REPEATED_STRUCTURE, "repeated structure makes the matches doubtful",
      "show where the repeated structure ends"},
+    {TV_REASON_CAMERA_CONTRADICTED,
+     "the matches contradict the camera: a rolling shutter while it turned, or a wrong lens",
+     "hold the camera still, or more light, for a shorter time; check that the camera file is of "
+     "these pictures, or calibrate the camera (twoview calibrate)"},
 };
 
 // Low parallax where the parallax is not low: it is the focal length that leaves the pose open.
@@ -271,6 +275,13 @@ Json principal_point_json(const tv_two_view& v) {
           {"shift_px", numbers_or_null(v.principal_point_shift, 2, true)}};
 }
 
+Json camera_misfit_json(const tv_two_view& v) {
+  if (!(v.camera_chi2 > 0)) return nullptr;
+  return {{"chi2", finite_or_null(v.camera_chi2)},
+          {"rotation_deg", finite_or_null(v.camera_turn_rad * kDegrees)},
+          {"direction_deg", finite_or_null(v.camera_direction_rad * kDegrees)}};
+}
+
 bool focal_length_is_uncertain(const tv_two_view& v) { return v.focal_sigma > 0.02; }
 
 double focal_change_percent(const tv_two_view& v) {
@@ -331,6 +342,7 @@ Json result_json(const Outcome& outcome) {
       numbers_or_null(v.principal_point_shift, 2, outcome.has_cameras);
   json["principal_point"] = outcome.has_cameras ? principal_point_json(v) : Json(nullptr);
   json["focal_length"] = focal_length_json(v);
+  json["camera_misfit"] = camera_misfit_json(v);
   const double scale = magnification(outcome);
   json["magnification"] = scale > 0 ? finite_or_null(scale) : Json(nullptr);
   json["num_points"] = r.num_points;

@@ -94,6 +94,10 @@ bool focal_length_is_uncertain(const tv_two_view& two_view);
 // By how much the focal length was changed, in per cent, rounded to tenths; never -0.
 double focal_change_percent(const tv_two_view& two_view);
 
+// What the matches say against the cameras as they were given: `chi2`, and by how much the pose
+// would move, `rotation_deg` and `direction_deg`; null where it was not tested.
+nlohmann::ordered_json camera_misfit_json(const tv_two_view& two_view);
+
 // `scale` (1 where it is as given), `sigma` and `uncertain` of the focal length; null where it is
 // taken as exact.
 nlohmann::ordered_json focal_length_json(const tv_two_view& two_view);

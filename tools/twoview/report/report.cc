@@ -206,6 +206,8 @@ std::string tables(const Outcome& outcome) {
   text += object_table("Inliers of each model", j["evidence"]);
   if (j["principal_point"].is_object())
     text += object_table("The principal point", j["principal_point"]);
+  if (j["camera_misfit"].is_object())
+    text += object_table("Against the camera as given", j["camera_misfit"]);
   text += object_table("Time, ms", j["timings_ms"]);
   text += object_table("Options as used", j["options"]);
   return text;

@@ -122,7 +122,7 @@ PairReport evaluate_pair(Arguments& a, const Cameras& cameras, const Pair& pair,
        {"rotation_error_deg", "translation_error_deg", "translation_error_signed_deg",
         "pose_error_deg", "num_matches", "num_inliers", "precision", "config", "verdict", "reasons",
         "probability_wrong", "covariance", "principal_point_shift_px", "principal_point",
-        "time_ms"})
+        "camera_misfit", "time_ms"})
     json[key] = nullptr;
   try {
     Outcome outcome;
@@ -142,6 +142,7 @@ PairReport evaluate_pair(Arguments& a, const Cameras& cameras, const Pair& pair,
     json["covariance"] = covariance_json(v);
     json["principal_point_shift_px"] = v.principal_point_shift;
     json["principal_point"] = principal_point_json(v);
+    json["camera_misfit"] = camera_misfit_json(v);
     report.shift = shift_evidence(v, outcome.camera[0]);
     json["time_ms"] = static_cast<double>(total_ns) * 1e-6;
     if (pair.has_truth) compare(pair, outcome, report);

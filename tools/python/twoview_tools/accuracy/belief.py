@@ -215,7 +215,8 @@ def row_of_result(result):
                     _plain(result.principal_point_asked_px) if asked else None,
                 "principal_point_asked_covariance":
                     _plain(result.principal_point_asked_covariance) if asked else None})
-    for field in ("probability_wrong", "agreement", "region_shift_rad", "num_places"):
+    for field in ("probability_wrong", "agreement", "region_shift_rad", "num_places",
+                  "camera_chi2", "camera_turn_rad", "camera_direction_rad"):
         row[field] = getattr(result, field)
     return row
 
