@@ -251,7 +251,8 @@ def _model(arguments):
         sigmas = [tv.FILM] * 2
     else:
         files = (a.camera, a.camera1 or a.camera)
-        cameras, sigmas = [read_camera(path) for path in files], [read_sigmas(path) for path in files]
+        cameras = [read_camera(path) for path in files]
+        sigmas = [read_sigmas(path) for path in files]
     names = [os.path.basename(path) for path in a.images]
     if names[0] == names[1]:
         raise BadInput(
