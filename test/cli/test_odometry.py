@@ -347,6 +347,46 @@ class OdometryTest(CliTest):
         self.assertEqual(result["num_tracked"], COUNT)
         self.assertLess(result["truth"]["ate_rmse_percent_of_path"], 1)
 
+    # -- a camera that nobody knows ------------------------------------------------------------
+
+    def test_a_flight_without_turns_leaves_the_focal_length_doubtful(self):
+        # Every focal length explains a camera that goes straight.
+        source = self.set_folder()
+        (source / "cameras.yaml").unlink()
+        done = self.succeed(self.odometry(source))
+        self.assertIn(b"note: no camera is given: the focal length is estimated", done.stderr)
+        text = done.stdout.decode()
+        self.assertIn("the focal length is doubtful", text)
+        self.assertIn("advice       turn while you move", text)
+        result = self.result()
+        focal = result["focal_length"]
+        self.assertEqual(list(focal),
+                         ["focal_35mm", "pixels", "sigma_percent", "uncertain", "k1", "source"])
+        self.assertTrue(focal["uncertain"])
+        self.assertEqual((focal["source"], focal["k1"]), ("estimated", None))
+        self.assertGreater(focal["sigma_percent"], 5)
+        diagonal = math.hypot(WIDTH, HEIGHT) / math.hypot(36, 24)
+        self.assertAlmostEqual(focal["pixels"], focal["focal_35mm"] * diagonal, delta=1e-6)
+        self.assertEqual(result["num_tracked"], COUNT)
+        self.assertNotIn("estimated_camera.yaml", self.listing())
+        self.assertIn("The focal length is doubtful", (self.out / "report.html").read_text())
+
+    def test_auto_comes_before_the_cameras_of_the_folder_and_needs_no_other_camera(self):
+        source = self.set_folder()
+        self.succeed(self.odometry(source))
+        self.assertIsNone(self.result()["focal_length"])
+        self.succeed(self.odometry(source, "--focal-35mm", "auto"))
+        result = self.result()
+        self.assertEqual(result["options"]["focal_35mm"], "auto")
+        self.assertEqual(result["focal_length"]["source"], "estimated")
+        camera = self.write("camera.yaml", camera_yaml())
+        self.assert_refused(self.odometry(source, "--focal-35mm", "auto", "--camera", camera),
+                            "without a camera file")
+        self.assert_refused(self.odometry("0", "--focal-35mm", "auto"), "a live one")
+        for verb in ("evaluate", "undistort", "triangulate"):
+            done = self.run_program(verb, "x", "--focal-35mm", "auto", "-o", self.out)
+            self.assert_refused(done, "--focal-35mm: auto: reconstruct and odometry alone")
+
     def test_large_frames_are_followed_by_the_advice_to_make_them_smaller(self):
         wide = png(2049, 48, bytes(2049 * 48))
         for k in range(2):
@@ -366,7 +406,7 @@ class OdometryTest(CliTest):
         text = " ".join(self.run_program("odometry", "--help").stdout.decode().split())
         for words in ("--max-points [500, 200000]=20000 most", "--fps [0.001, 10000] frames",
                       "--live-port [1, 65535] the page's", "--seed [0, 2^64 - 1]=",
-                      "--focal-35mm [1, 10000]",
+                      "--focal-35mm auto or [1, 10000]",
                       "--kernels auto|c|sse2|avx2|avx512|neon=auto kernel"):
             self.assertIn(words, text)
         for flag, value, words in (
@@ -856,7 +896,6 @@ distortion_coefficients: [0, 0, 0, 0]
         refused("without a camera file", more=("--camera", "absent", "--focal-35mm", 26))
         refused("--focal-35mm: 'nan' is not a number", more=("--focal-35mm", "nan"))
         (source / "cameras.yaml").unlink()
-        self.assert_refused(self.odometry(source), "--camera is required", "set folder")
         self.assert_refused(self.odometry(source / "images"), "--fps is required")
         (self.folder / "void").mkdir()
         self.assert_refused(self.odometry("void"), "neither frames.txt")

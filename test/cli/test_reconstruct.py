@@ -359,6 +359,29 @@ class Reconstruct(cli.CliTest):
         self.assertIn(b"matches ok, no pose: fundamental matrix only", done.stdout)
         self.assertEqual(result["verdict"], "ok")
 
+    def test_without_a_camera_the_focal_length_is_estimated_and_doubtful(self):
+        for more in ((), ("--focal-35mm", "auto")):
+            done = self.succeed(self.reconstruct(*more, camera=False))
+            result = self.result()
+            self.assertEqual(result["verdict"], "doubtful")
+            self.assertIn("low_parallax", result["reasons"])
+            focal = result["focal_length"]
+            self.assertTrue(focal["uncertain"])
+            self.assertEqual((focal["source"], focal["k1"]), ("estimated", None))
+            self.assertGreater(focal["sigma_percent"], 5)
+            diagonal = math.hypot(WIDTH, HEIGHT) / math.hypot(36, 24)
+            self.assertAlmostEqual(focal["pixels"], focal["focal_35mm"] * diagonal, delta=1e-6)
+            self.assertEqual([c["source"] for c in result["cameras"]], ["estimated"] * 2)
+            self.assertEqual(result["options"]["focal_35mm"], more[1] if more else None)
+            text = " ".join(done.stdout.decode().split())
+            self.assertIn("note no camera is known (left.png" if not more else
+                          "note the focal length is estimated", text)
+            self.assertIn("the focal length is too uncertain for this pose", text)
+            self.assertIn("advice the focal length is doubtful: give --focal-35mm", text)
+        self.assert_refused(self.reconstruct("--focal-35mm", "auto", "--method", "seven-point",
+                                             camera=False, out=self.folder / "other"),
+                            "--method seven-point does not find", out=self.folder / "other")
+
     def test_a_focal_length_of_35mm_film_is_a_pinhole_with_the_same_diagonal(self):
         focal_35mm = FOCAL * math.hypot(36, 24) / math.hypot(WIDTH, HEIGHT)
         self.succeed(self.plain())

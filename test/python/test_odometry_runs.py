@@ -130,6 +130,20 @@ class Flights(unittest.TestCase):
         self.assertLess(2 * right, carried(np.eye(3), 0 * t))
         self.assertLess(1.1 * right, carried(R1.T @ R0, -t))
 
+    def test_the_program_finds_the_focal_length_of_a_flight_that_turns(self):
+        folder = flights.render(2, os.path.join(self.scratch.name, "turning"),
+                                ["--first-frame", "60", "--max-frames", "110",
+                                 "--depth-every", "0"])
+        camera = next(iter(formats.read_camera_set(folder + "/cameras.yaml").values()))
+        out = os.path.join(self.scratch.name, "without_camera")
+        runs.run_odometry(runs.program_path(None), folder, out, ["--focal-35mm", "auto"])
+        with open(out + "/result.json", encoding="utf-8") as file:
+            focal = json.load(file)["focal_length"]
+        self.assertFalse(focal["uncertain"])
+        self.assertLess(abs(focal["pixels"] / np.sqrt(camera.fx * camera.fy) - 1), 0.05)
+        written = formats.read_camera(out + "/estimated_camera.yaml")
+        self.assertAlmostEqual(written.fx, focal["pixels"], delta=1e-6)
+
     def test_changed_copies_see_the_same_points(self):
         def pixels(found, k, world):
             camera = next(iter(formats.read_camera_set(found.file("cameras.yaml")).values()))

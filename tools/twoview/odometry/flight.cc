@@ -110,7 +110,9 @@ void Flight::prepare(SourceFrame& frame) {
 
 void Flight::start(const SourceFrame& first) {
   SourceFrame frame = first;
-  if (options_.focal_35mm > 0) {
+  if (options_.camera) {
+    file_camera_ = *options_.camera;
+  } else if (options_.focal_35mm > 0) {
     file_camera_ = film_camera(options_.focal_35mm, frame.luma.cols, frame.luma.rows);
   } else if (options_.camera_file.empty()) {
     const auto camera = source_.camera(frame, frame.luma.cols, frame.luma.rows);
@@ -216,7 +218,8 @@ void Flight::track_frame(SourceFrame frame) {
   }
   if (frame.world_from_cam) is_upright_ = true;
   picture_ = frame.luma;
-  if (record.is_keyframe) thumbnails_[static_cast<int>(given_.size())] = thumbnail_of(frame.luma);
+  if (record.is_keyframe && options_.keeps_pictures)
+    thumbnails_[static_cast<int>(given_.size())] = thumbnail_of(frame.luma);
   masked_ += cli::masked_share(mask_);
   given_.push_back(frames_.size());
   frames_.push_back(record);

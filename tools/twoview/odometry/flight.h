@@ -7,6 +7,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -77,9 +78,11 @@ struct FlightOptions {
   int every = 1;
   int resize = 0;  // longer side, pixels; 0: as they are
   Masks masks;
-  bool scales_camera = false;  // whether camera_file may be for another size of the picture
-  std::string camera_file;     // empty: the source's own camera, or
-  double focal_35mm = 0;       // a pinhole's of this focal length, millimetres; 0: none
+  bool scales_camera = false;       // whether camera_file may be for another size of the picture
+  std::string camera_file;          // empty: the source's own camera, or
+  double focal_35mm = 0;            // a pinhole's of this focal length, millimetres; 0: none
+  std::optional<tv_camera> camera;  // of the source's frames, in place of all these
+  bool keeps_pictures = true;       // for the report
 };
 
 class Flight {

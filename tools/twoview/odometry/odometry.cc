@@ -14,6 +14,7 @@
 #include "files/camera_file.h"
 #include "files/camera_formats.h"
 #include "files/image_file.h"
+#include "odometry/film_lens.h"
 #include "odometry/flight.h"
 #include "odometry/live.h"
 #include "odometry/outputs.h"
@@ -36,9 +37,10 @@ namespace fs = std::filesystem;
 
 const char* const kCameraFile = "corrected_camera.yaml";
 const char* const kStillFile = "still_mask.png";
+const char* const kEstimatedFile = "estimated_camera.yaml";
 const std::vector<std::string> kFiles = {
     "trajectory.txt", "live.txt",  "keyframes.txt", kCameraFile,   "covariances.txt", kStillFile,
-    "frames.csv",     "cloud.ply", "map.twm",       "report.html", "result.json"};
+    "frames.csv",     "cloud.ply", "map.twm",       "report.html", "result.json",     kEstimatedFile};
 const std::vector<std::string> kColmapFiles = {"cameras.txt", "images.txt", "points3D.txt"};
 
 struct Arguments {
@@ -62,10 +64,21 @@ bool is_number(const std::string& text) {
          std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
 }
 
+bool is_auto(const Arguments& a) { return a.flight.focal_35mm == kAutoFocal; }
+
 // For a source that says nothing of its camera: `why`.
 void require_camera(const Arguments& a, const char* why) {
   if (a.camera.empty() && a.flight.focal_35mm == 0)
     throw BadInput(std::string("--camera is required, or --focal-35mm: ") + why);
+}
+
+// For a source that can be read once only: its focal length cannot be estimated beforehand.
+void require_camera_of_live(const Arguments& a, const char* why) {
+  require_camera(a, why);
+  if (is_auto(a))
+    throw BadInput(
+        "--focal-35mm auto reads its source several times, which a live one does not allow: record "
+        "a film first, and give the estimated_camera.yaml of its odometry as --camera");
 }
 
 std::unique_ptr<FrameSource> open_recording_folder(const Arguments& a) {
@@ -81,19 +94,19 @@ std::unique_ptr<FrameSource> open_source(const Arguments& a) {
 #ifdef TWOVIEW_HAS_DRONE
   if (!a.drone.host.empty()) {
     if (!a.source.empty()) throw BadInput("give SOURCE or --drone, not both");
-    require_camera(a, "the drone does not describe its camera");
+    require_camera_of_live(a, "the drone does not describe its camera");
     return open_drone(a.drone, a.duration, a.camera);
   }
   if (a.vehicle.given()) {
     if (!a.source.empty()) throw BadInput("give SOURCE or --mavlink, not both");
-    require_camera(a, "MAVLink does not describe the camera");
+    require_camera_of_live(a, "MAVLink does not describe the camera");
     return open_vehicle(a.vehicle, a.duration, a.camera, a.common.quiet);
   }
 #endif
   if (a.source.empty()) throw BadInput("SOURCE is required (see twoview odometry --help)");
 #ifdef TWOVIEW_HAS_CAMERA_SOURCE
   if (CameraSource::kind_of(a.source) == CameraSource::Kind::kLive && !is_number(a.source)) {
-    require_camera(a, "a camera does not describe its lens");
+    require_camera_of_live(a, "a camera does not describe its lens");
     if (a.fps > 0) throw BadInput("--fps: the frames of a camera have times");
     return open_camera(a.source);
   }
@@ -109,7 +122,7 @@ std::unique_ptr<FrameSource> open_source(const Arguments& a) {
   }
   if (fs::is_regular_file(path, error)) return open_film(a.source, a.fps);
   if (is_number(a.source)) {
-    require_camera(a, "a camera does not describe its lens");
+    require_camera_of_live(a, "a camera does not describe its lens");
     if (a.fps > 0) throw BadInput("--fps: the frames of a camera have times");
     return open_camera(std::stoi(a.source));
   }
@@ -181,16 +194,27 @@ nlohmann::ordered_json options_of(const Arguments& a, const std::string& truth_f
   json["no_imu"] = a.ignores_imu;
   json["kernels"] = tv_kernels_string(static_cast<tv_kernels>(o.kernels));
   json["camera"] = text_or_null(a.camera);
-  if (a.flight.focal_35mm > 0)
-    json["focal_35mm"] = a.flight.focal_35mm;
-  else
-    json["focal_35mm"] = nullptr;
+  json["focal_35mm"] = nullptr;
+  if (is_auto(a)) json["focal_35mm"] = "auto";
+  if (a.flight.focal_35mm > 0) json["focal_35mm"] = a.flight.focal_35mm;
   json["truth"] = text_or_null(truth_file);
   return json;
 }
 
-void make_files(const FlightResult& result, const std::string& name, OutputSet& files) {
+// The camera that was estimated, as a file for the next flight. One that is doubtful is not
+// written: as a file it would pass for a calibration.
+std::string estimated_camera_text(const FilmLens& lens) {
+  char text[64];
+  const double sigma = std::max(lens.sigma, kPlainFile.focal);
+  std::snprintf(text, sizeof text, "focal_sigma: %.3g\ncenter_sigma: %.3g\n", sigma, kFilm.center);
+  return camera_yaml(lens.camera()) + text;
+}
+
+void make_files(const FlightResult& result, const std::optional<FilmLens>& lens,
+                const std::string& name, OutputSet& files) {
   const Flight& flight = *result.flight;
+  if (lens && !lens->is_uncertain && !files.is_input(kEstimatedFile))
+    files.add(kEstimatedFile, estimated_camera_text(*lens));
   files.add("result.json", json_text(result.json));
   files.add("frames.csv", frames_csv(flight));
   files.add("trajectory.txt", trajectory_text(flight, false));
@@ -251,11 +275,18 @@ std::string still_note(const FlightResult& result) {
          " shows where";
 }
 
-std::string summary(const FlightResult& result, const FrameSource& source, const OutputSet& files,
-                    bool has_colmap) {
+std::string summary(const FlightResult& result, const std::optional<FilmLens>& lens,
+                    const FrameSource& source, const OutputSet& files, bool has_colmap) {
   const nlohmann::ordered_json& j = result.json;
   std::string text =
       summary_line("source", "%s, %d frames", source.kind().c_str(), j["num_frames"].get<int>());
+  if (lens) {
+    text += summary_line("camera", "%s, estimated from the film", lens->words().c_str());
+    if (lens->is_uncertain) {
+      text += summary_line("doubtful", "the focal length is doubtful: do not fly by this path");
+      text += summary_line("advice", "%s", kDoubtfulFocalAdvice);
+    }
+  }
   std::string counts;
   for (const auto& [name, count] : j["status_counts"].items())
     if (count.get<int>() > 0)
@@ -305,6 +336,41 @@ std::string summary(const FlightResult& result, const FrameSource& source, const
                              has_colmap ? " colmap/" : "");
 }
 
+// The lens of a film of which neither the command line nor the source says a camera; empty where
+// one is known. Photographs' EXIF data say the focal length: it is put into the options.
+std::optional<FilmLens> lens_of_film(const Arguments& a, FrameSource& source,
+                                     const std::atomic<bool>& stop, FlightOptions* options) {
+  if (!is_auto(a)) {
+    if (!a.camera.empty() || options->focal_35mm > 0 || !source.can_run_again()) return {};
+    SourceFrame first;
+    source.run([](int index) { return index == 0; },
+               [&first](const SourceFrame& frame) {
+                 first = frame;
+                 return false;
+               },
+               stop);
+    if (first.luma.empty()) return {};  // which the flight refuses
+    if (source.camera(first, first.luma.cols, first.luma.rows)) return {};
+    if (first.exif.focal_35mm > 0) {
+      options->focal_35mm = first.exif.focal_35mm;
+      std::fprintf(stderr,
+                   "twoview: note: focal length %.4g mm (35 mm equivalent) from EXIF; --camera is "
+                   "better\n",
+                   options->focal_35mm);
+      return {};
+    }
+  }
+  options->focal_35mm = 0;
+  std::fprintf(stderr,
+               "twoview: note: no camera is given: the focal length is estimated from the film, "
+               "which takes up to four times as long\n");
+  const Progress line(!a.common.quiet);
+  const FilmLens lens = estimate_film_lens(source, *options, stop,
+                                           [&line](const std::string& words) { line.tell(words); });
+  options->camera = lens.camera();
+  return lens;
+}
+
 int exit_status(const Flight& flight, const FlightResult& result) {
   if (result.live_stretch.segment < 0) {
     std::fprintf(stderr, "twoview: nothing could be tracked: no two frames determine a map\n");
@@ -320,14 +386,13 @@ int odometry(Arguments& a) {
   common.options.kernels = a.flight.odometry.kernels;
   a.flight.camera_file = a.camera;
   a.flight.odometry.correct_camera = a.keeps_camera ? 0 : 1;
-  if (a.flight.focal_35mm > 0 && !a.camera.empty())
+  if (a.flight.focal_35mm != 0 && !a.camera.empty())
     throw BadInput("--focal-35mm is for films and photographs without a camera file");
   const std::unique_ptr<FrameSource> source = open_source(a);
   const std::string truth_file = a.truth.empty() ? source->truth_file() : a.truth;
   std::optional<Trajectory> truth;
   if (!truth_file.empty())
     truth = load_trajectory(truth_file, source->times(), source->body_from_camera());
-  Flight flight(*source, a.flight);
   Session session(common.options);  // says which kernels are used
   session.context(64, 64);
   const std::atomic<bool>& stop = stop_flag_for_signals();
@@ -337,6 +402,9 @@ int odometry(Arguments& a) {
   files.keep(truth_file);
   if (!source->note().empty()) std::fprintf(stderr, "twoview: note: %s\n", source->note().c_str());
   const int wanted = num_wanted(*source, a.flight);
+  FlightOptions options = a.flight;
+  const std::optional<FilmLens> lens = lens_of_film(a, *source, stop, &options);
+  Flight flight(*source, options);
   std::optional<LivePage> live;
   if (a.is_live || a.live_port > 0) {
     live.emplace(a.live_port);
@@ -361,6 +429,7 @@ int odometry(Arguments& a) {
   FlightResult result =
       result_of(flight, truth, wanted < 0 ? static_cast<int>(flight.frames().size()) : wanted);
   if (!flight.still_mask().empty()) common.note(still_note(result));
+  result.json["focal_length"] = lens ? lens->json() : nlohmann::ordered_json(nullptr);
   result.json["interrupted"] = stop.load();
   result.json["source"] = a.source.empty() ? source->kind() : a.source;
   result.json["options"] = options_of(a, truth_file);
@@ -368,7 +437,7 @@ int odometry(Arguments& a) {
   result.json["version"] = tv_version_string();
   result.json["kernels"] = session.kernels();
   const std::string name = fs::absolute(fs::path(a.source) / "x").parent_path().filename().string();
-  make_files(result, a.source.empty() ? source->kind() : name, files);
+  make_files(result, lens, a.source.empty() ? source->kind() : name, files);
   const bool has_map = !result.keyframes.empty();
   const fs::path colmap_folder = files.folder() / "colmap";
   std::optional<OutputSet> colmap;  // without a map, to remove an earlier run's files
@@ -379,7 +448,7 @@ int odometry(Arguments& a) {
   }
   if (common.json) print(json_text(result.json));
   const std::string notes = common.note_lines();
-  if (common.speaks()) print(notes + summary(result, *source, files, has_map));
+  if (common.speaks()) print(notes + summary(result, lens, *source, files, has_map));
   files.commit();
   files.remove_others(kFiles);
   if (colmap) {
@@ -408,10 +477,11 @@ void add_odometry(CLI::App& program, Run& run) {
           "a film; a camera: its number, v4l2:/dev/video0, gst:PIPELINE or rtsp://...; a recording "
           "of a drone")
       ->type_name("SOURCE");
-  verb->add_option("--camera", a->camera, "camera file; without: what the source says of it")
+  verb->add_option("--camera", a->camera,
+                   "camera file; without: what the source says of it, or an estimate from the film")
       ->type_name("FILE");
   add_scale_camera(*verb, a->flight.scales_camera);
-  add_focal_35mm(*verb, a->flight.focal_35mm);
+  add_focal_35mm(*verb, a->flight.focal_35mm, true);
   verb->add_option("--truth", a->truth, "true poses of TUM, EuRoC or KITTI to compare with")
       ->type_name("FILE");
   add_number(*verb, "fps", &a->fps, 0.001, 10000,

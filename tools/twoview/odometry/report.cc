@@ -5,6 +5,7 @@
 #include <map>
 
 #include "odometry/assets.h"
+#include "odometry/film_lens.h"
 #include "pair/result.h"
 #include "report/assets.h"
 #include "report/html.h"
@@ -237,6 +238,10 @@ std::string cards(const FlightResult& result) {
                  "by which the principal point was moved: " + formatted("%.1f", x) + ", " +
                      formatted("%.1f", y));
   }
+  if (const Json& focal = j["focal_length"]; focal.is_object())
+    text += card(formatted("%.1f", focal["focal_35mm"].get<double>()), "mm",
+                 "focal length (35 mm equivalent), estimated from the film to " +
+                     formatted("%.1f", focal["sigma_percent"].get<double>()) + " %");
   if (is_metric)
     text += number_card(j["scale_sigma"], "%.2g", "", "1 sigma of the scale, relative");
   text += number_card(j["time_ms"]["mean"], "%.2f", "ms", "CPU time a frame, mean");
@@ -296,6 +301,10 @@ Headline headline(const FlightResult& result) {
   if (posed == 0) return {"poor", "no map", "No two frames of this source determine a map."};
   if (!result.flight->ended_tracked())
     return {"poor", "ended lost", share + "; the last frame has none."};
+  if (const Json& focal = j["focal_length"]; focal.is_object() && focal["uncertain"].get<bool>())
+    return {"poor", "doubtful",
+            std::string("The focal length is doubtful, and so is the shape of the path: ") +
+                kDoubtfulFocalAdvice + ". " + share + "."};
   if (segments > 1)
     return {"fair", "in pieces", share + ", in " + std::to_string(segments) + " segments."};
   if (lost > 0)

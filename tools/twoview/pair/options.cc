@@ -311,14 +311,23 @@ double number_of_flag(const std::string& flag, const std::string& text, double l
                                        (has_comma ? "; one number, with a decimal point" : ""));
 }
 
-void add_focal_35mm(CLI::App& verb, double& focal_35mm) {
+void add_focal_35mm(CLI::App& verb, double& focal_35mm, bool may_be_auto) {
+  const std::string name = "--focal-35mm", automatic = "auto";
+  const std::string help =
+      "in place of a camera file: the focal length as for 35 mm film; no lens distortion";
   verb.add_option_function<std::string>(
-          "--focal-35mm",
-          [&focal_35mm](const std::string& text) {
-            focal_35mm = number_of_flag("--focal-35mm", text, kShortestFilm, kLongestFilm);
+          name,
+          [=, &focal_35mm](const std::string& text) {
+            if (text == automatic && !may_be_auto)
+              throw CLI::ValidationError(name, "auto: reconstruct and odometry alone estimate it");
+            focal_35mm = text == automatic
+                             ? kAutoFocal
+                             : number_of_flag(name, text, kShortestFilm, kLongestFilm);
           },
-          "in place of a camera file: the focal length as for 35 mm film; no lens distortion")
-      ->type_name("[" + number_text(kShortestFilm) + ", " + number_text(kLongestFilm) + "]");
+          may_be_auto ? help + "; auto (where nothing is known): estimated from the pictures"
+                      : help)
+      ->type_name((may_be_auto ? "auto or [" : "[") + number_text(kShortestFilm) + ", " +
+                  number_text(kLongestFilm) + "]");
 }
 
 void add_scale_camera(CLI::App& verb, bool& scales_camera) {

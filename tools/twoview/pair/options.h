@@ -71,8 +71,10 @@ std::string method_name(int32_t method);
 // the flag and the range.
 double number_of_flag(const std::string& flag, const std::string& text, double low, double high);
 
-// Adds --focal-35mm to a verb, in millimetres.
-void add_focal_35mm(CLI::App& verb, double& focal_35mm);
+// Adds --focal-35mm to a verb, in millimetres. may_be_auto: the verb can estimate it; the text
+// "auto" then is kAutoFocal.
+constexpr double kAutoFocal = -1;
+void add_focal_35mm(CLI::App& verb, double& focal_35mm, bool may_be_auto = false);
 
 // The flag --scale-camera, beside an option --camera.
 void add_scale_camera(CLI::App& verb, bool& scales_camera);

@@ -54,6 +54,10 @@ const Phrase kReasons[] = {
 };
 
 // Low parallax where the parallax is not low: it is the focal length that leaves the pose open.
+// The advice where nothing of the camera was given.
+constexpr const char* kNoCamera =
+    "the focal length is doubtful: give --focal-35mm where you know it, calibrate the camera "
+    "(twoview calibrate), or estimate it from a film (twoview odometry)";
 const Phrase kFocalLength = {TV_REASON_LOW_PARALLAX,
                              "the focal length is too uncertain for this pose",
                              "calibrate the camera (twoview calibrate)"};
@@ -89,11 +93,13 @@ std::vector<Phrase> phrases_of(const Outcome& outcome) {
     if (zoomed && phrase.reason == TV_REASON_SECOND_MOTION) continue;
     const bool of_focal_length = phrase.reason == TV_REASON_LOW_PARALLAX &&
                                  focal_length_is_uncertain(v) &&
-                                 v.median_parallax_rad > kMuchParallaxRad;
+                                 (v.median_parallax_rad > kMuchParallaxRad ||
+                                  outcome.estimates_focal_length);
     phrases.push_back(of_focal_length ? kFocalLength : phrase);
     const bool same_size = outcome.camera[0].width == outcome.camera[1].width &&
                            outcome.camera[0].height == outcome.camera[1].height;
     if (!outcome.has_cameras || outcome.has_camera_files) continue;
+    if (of_focal_length && outcome.estimates_focal_length) phrases.back().advice = kNoCamera;
     if (of_focal_length && !same_size) phrases.back().advice = kTwoFocalLengths;
     if (phrase.reason == TV_REASON_LOW_INLIER_RATIO) phrases.back().advice = kNoFileFewAgree;
   }

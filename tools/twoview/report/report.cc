@@ -177,7 +177,10 @@ std::string camera_table(const Outcome& outcome) {
     } else {
       const std::string focal =
           formatted("%.4g mm as for 35 mm film", origin["focal_35mm"].get<double>());
-      rows += row(name, (origin["source"] == "exif" ? "EXIF data: " : "--focal-35mm: ") + focal);
+      const std::string from = origin["source"] == "exif"        ? "EXIF data: "
+                               : origin["source"] == "estimated" ? "none given, searched around "
+                                                                 : "--focal-35mm: ";
+      rows += row(name, from + focal);
     }
     const tv_camera& camera = outcome.camera[i];
     const double values[] = {camera.fx, camera.fy, camera.cx, camera.cy};

@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "files/camera_formats.h"
 #include "pair/options.h"
+#include "pair/simple_lens.h"
 
 namespace cli {
 namespace {
@@ -30,7 +31,7 @@ ImageFacts facts_of(const Picture& picture) {
   return {picture.name, picture.file_width, picture.file_height, picture.exif};
 }
 
-void CameraOptions::add_to(CLI::App& verb) {
+void CameraOptions::add_to(CLI::App& verb, bool may_be_auto) {
   verb.add_option("--camera", both,
                   "camera of both images: YAML of OpenCV, ROS or Kalibr, cameras.yaml, or COLMAP's "
                   "cameras.txt; FILE:NAME takes one of several")
@@ -38,13 +39,13 @@ void CameraOptions::add_to(CLI::App& verb) {
   verb.add_option("--camera0", of[0], "camera of image 0")->type_name("FILE");
   verb.add_option("--camera1", of[1], "camera of image 1")->type_name("FILE");
   add_scale_camera(verb, scales_camera);
-  add_focal_35mm(verb, focal_35mm);
+  add_focal_35mm(verb, focal_35mm, may_be_auto);
 }
 
 std::array<std::string, 2> CameraOptions::files() const {
   if (!both.empty() && (!of[0].empty() || !of[1].empty()))
     throw BadInput("give --camera, or --camera0 and --camera1, not both");
-  if (focal_35mm > 0 && !(both.empty() && of[0].empty() && of[1].empty()))
+  if (focal_35mm != 0 && !(both.empty() && of[0].empty() && of[1].empty()))
     throw BadInput("--focal-35mm is for photographs without a camera file");
   if (!both.empty()) return {both, both};
   if (of[0].empty() != of[1].empty())
@@ -73,10 +74,19 @@ ImageCameras CameraOptions::cameras_of(const ImageFacts& image0, const ImageFact
     }
   } else if (focal_35mm > 0) {
     for (size_t i = 0; i < 2; ++i) cameras[i] = film(focal_35mm, *images[i]);
+  } else if (focal_35mm == kAutoFocal) {
+    for (size_t i = 0; i < 2; ++i) cameras[i] = camera_to_estimate(*images[i]);
   } else if (image0.exif.focal_35mm > 0 && image1.exif.focal_35mm > 0) {
     for (size_t i = 0; i < 2; ++i) cameras[i] = by_exif(*images[i]);
   }
   return cameras;
+}
+
+ImageCamera camera_to_estimate(const ImageFacts& image) {
+  ImageCamera camera = film(kPriorFocal35mm, image);
+  camera.source = ImageCamera::kEstimated;
+  camera.sigmas.focal = kPriorLogFocal;
+  return camera;
 }
 
 std::string exif_note(const ImageCameras& cameras) {
@@ -100,7 +110,7 @@ std::string exif_note(const ImageCameras& cameras) {
 
 nlohmann::ordered_json cameras_json(const ImageCameras& cameras) {
   using Json = nlohmann::ordered_json;
-  const Json names[] = {nullptr, "file", "focal_35mm", "exif"};
+  const Json names[] = {nullptr, "file", "focal_35mm", "exif", "estimated"};
   Json list = Json::array();
   for (const ImageCamera& camera : cameras)
     list.push_back({{"source", names[camera.source]},

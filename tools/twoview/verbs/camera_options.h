@@ -15,11 +15,11 @@ namespace cli {
 
 // The camera of an image and where it is from.
 struct ImageCamera {
-  enum Source { kNone, kFile, kFocal, kExif } source = kNone;
+  enum Source { kNone, kFile, kFocal, kExif, kEstimated } source = kNone;
   tv_camera camera{};
   CalibrationSigmas sigmas{0, 0};
   std::string file;                // the camera file as given
-  double focal_35mm = 0;           // millimetres, where source is kFocal or kExif
+  double focal_35mm = 0;           // millimetres, where source is kFocal, kExif or kEstimated (start)
   std::vector<std::string> notes;  // of the file: what was left out, and that it was scaled
   std::string doubt;               // what may be wrong with EXIF's focal length: "; a.jpg was ..."
 };
@@ -35,10 +35,11 @@ ImageFacts facts_of(const Picture& picture);
 
 struct CameraOptions {
   std::string both, of[2];
-  double focal_35mm = 0;
+  double focal_35mm = 0;  // millimetres, or kAutoFocal; 0: not given
   bool scales_camera = false;
 
-  void add_to(CLI::App& verb);
+  // may_be_auto: the verb estimates the focal length of a pair.
+  void add_to(CLI::App& verb, bool may_be_auto = false);
   // The camera file of each image; both are empty if no camera file is given. Throws BadInput if
   // only one of --camera0 and --camera1 is given, if either is given beside --camera, and if
   // --focal-35mm is given beside a file.
@@ -50,10 +51,14 @@ struct CameraOptions {
   ImageCameras cameras_of(const ImageFacts& image0, const ImageFacts& image1) const;
 };
 
+// The camera from which the focal length of a pair is estimated: as for 35 mm film that which is
+// most common, with the sigma of all that there are.
+ImageCamera camera_to_estimate(const ImageFacts& image);
+
 // A line that says which focal length EXIF gave; empty where it gave none.
 std::string exif_note(const ImageCameras& cameras);
 
-// A list of two: `source` ("file", "focal_35mm", "exif" or null), `file`, `focal_35mm`.
+// A list of two: `source` ("file", "focal_35mm", "exif", "estimated" or null), `file`, `focal_35mm`.
 nlohmann::ordered_json cameras_json(const ImageCameras& cameras);
 
 }  // namespace cli

@@ -12,6 +12,7 @@
 #include "pair/dense_cloud.h"
 #endif
 #include "pair/reconstruct_pair.h"
+#include "pair/simple_lens.h"
 #include "pair/truth.h"
 #include "pictures/canvas.h"
 #include "pictures/pictures.h"
@@ -49,6 +50,9 @@ void check_inputs(const Arguments& a) {
     return;
   }
   if (!a.image[0].empty()) throw BadInput("give A and B or --recording, not both");
+  if (a.cameras.focal_35mm == kAutoFocal)
+    throw BadInput(
+        "--focal-35mm auto: a recording is twoview odometry's, which estimates it from the flight");
   if (a.cameras.both.empty() && !(a.cameras.focal_35mm > 0))
     throw BadInput("--recording needs --camera, or --focal-35mm");
 }
@@ -57,12 +61,55 @@ bool can_do_without_cameras(int32_t method) {
   return method == TV_SOLVER_EIGHT_POINT || method == TV_SOLVER_SEVEN_POINT;
 }
 
-// Throws BadInput if the solver needs cameras and none are known.
-void require_cameras(const ImageCameras& cameras, int32_t method, const Picture pictures[2]) {
-  if (cameras[0].source != ImageCamera::kNone || can_do_without_cameras(method)) return;
+// Where the solver needs cameras and none are known: those from which the focal length is
+// estimated. Throws BadInput for two pictures of different sizes, which have two focal lengths, and
+// where EXIF data have the focal length of one picture alone.
+void estimate_unknown_cameras(Arguments& a, const Picture pictures[2], ImageCameras* cameras) {
+  const bool is_wanted = (*cameras)[0].source == ImageCamera::kEstimated;
+  const bool needs_cameras = !can_do_without_cameras(a.common.options.estimate.method);
+  if (!is_wanted && ((*cameras)[0].source != ImageCamera::kNone || !needs_cameras)) return;
   const Picture& without = pictures[pictures[0].exif.focal_35mm > 0 ? 1 : 0];
-  throw BadInput("no camera is known: " + without.name + " " + without.exif.gap +
-                 "; give --focal-35mm, or --camera, which twoview calibrate makes");
+  const std::string why = without.name + " " + without.exif.gap;
+  if (is_wanted && !needs_cameras)
+    throw BadInput("--focal-35mm auto estimates the focal length with the pose, which --method " +
+                   method_name(a.common.options.estimate.method) + " does not find");
+  const bool have_one_size = pictures[0].file_width == pictures[1].file_width &&
+                             pictures[0].file_height == pictures[1].file_height;
+  const bool one_is_known = pictures[0].exif.focal_35mm > 0 || pictures[1].exif.focal_35mm > 0;
+  if (!have_one_size || (!is_wanted && one_is_known))
+    throw BadInput((is_wanted ? "--focal-35mm auto needs two pictures of one size"
+                              : "no camera is known: " + why) +
+                   "; give --focal-35mm, or --camera, which twoview calibrate makes");
+  for (size_t i = 0; i < 2; ++i) (*cameras)[i] = camera_to_estimate(facts_of(pictures[i]));
+  a.common.note((is_wanted ? std::string() : "no camera is known (" + why + "): ") +
+                "the focal length is estimated from this pair and is doubtful; --focal-35mm or "
+                "--camera is better");
+}
+
+// Says in the result what was estimated. A pair leaves at least 15 per cent of the focal length
+// open, so that its pose and the shape of its cloud are doubtful, whatever else there is.
+void judge_estimated_focal_length(Outcome& outcome) {
+  tv_two_view& v = outcome.two_view;
+  if (!has_full_pose(v)) return;
+  v.reasons |= TV_REASON_LOW_PARALLAX;  // its words are those of the focal length then
+  if (v.verdict == TV_VERDICT_OK) v.verdict = TV_VERDICT_DOUBTFUL;
+}
+
+// The keys that say the focal length itself.
+void add_estimated_focal_length(const Outcome& outcome, nlohmann::ordered_json& json) {
+  const tv_two_view& v = outcome.two_view;
+  const tv_camera& start = outcome.camera[0];
+  const bool is_known = has_full_pose(v) && v.focal_sigma > 0;
+  const double pixels = start.fx * (is_known && v.focal_scale > 0 ? v.focal_scale : 1);
+  const double sigma = is_known ? v.focal_sigma : kPriorLogFocal;
+  nlohmann::ordered_json& focal = json["focal_length"];
+  if (focal.is_null()) focal = {{"scale", 1.0}, {"sigma", sigma}};
+  focal["focal_35mm"] = focal_35mm_of(pixels, start.width, start.height);
+  focal["pixels"] = pixels * outcome.picture[0].file_width / start.width;
+  focal["sigma_percent"] = 100 * sigma;
+  focal["uncertain"] = sigma > kMostFocalSigma;
+  focal["k1"] = nullptr;
+  focal["source"] = "estimated";
 }
 
 // Notes that the pictures are not used as a viewer shows them: a camera that is held upright stores
@@ -82,7 +129,7 @@ void note_turns(const Picture pictures[2], Common& common) {
 ImageCameras choose_cameras(Arguments& a, const Picture pictures[2]) {
   ImageCameras cameras = a.cameras.cameras_of(facts_of(pictures[0]), facts_of(pictures[1]));
   const int32_t method = a.common.options.estimate.method;
-  require_cameras(cameras, method, pictures);
+  estimate_unknown_cameras(a, pictures, &cameras);
   if (cameras[0].source == ImageCamera::kNone)
     a.common.note("no camera, so no pose: give --camera or --focal-35mm");
   if (cameras[0].source != ImageCamera::kExif) return cameras;
@@ -132,6 +179,7 @@ ImageCameras load_inputs(Arguments& a, RecordingInput* recording, Session& sessi
     for (const std::string& line : camera.notes) a.common.note(line);
   outcome.has_cameras = cameras[0].source != ImageCamera::kNone;
   outcome.has_camera_files = cameras[0].source == ImageCamera::kFile;
+  outcome.estimates_focal_length = cameras[0].source == ImageCamera::kEstimated;
   for (size_t i = 0; i < 2; ++i) {
     Picture& picture = outcome.picture[i];
     add_picture_mask(picture.name, picture, a.common);
@@ -152,7 +200,9 @@ nlohmann::ordered_json options_of(const Arguments& a) {
   }
   const double focal = a.cameras.focal_35mm;
   json["dense"] = a.dense;
-  json["focal_35mm"] = focal > 0 ? nlohmann::ordered_json(focal) : nlohmann::ordered_json(nullptr);
+  json["focal_35mm"] = nullptr;
+  if (focal == kAutoFocal) json["focal_35mm"] = "auto";
+  if (focal > 0) json["focal_35mm"] = focal;
   return json;
 }
 
@@ -376,7 +426,9 @@ int reconstruct(Arguments& a) {
 #endif
   if (recording) recording->add_scale(outcome);
 
+  if (outcome.estimates_focal_length) judge_estimated_focal_length(outcome);
   outcome.json = result_json(outcome);
+  if (outcome.estimates_focal_length) add_estimated_focal_length(outcome, outcome.json);
   if (recording) recording->add_json(outcome);
   if (has_truth)
     outcome.json["truth"] =
@@ -417,7 +469,7 @@ void add_reconstruct(CLI::App& program, Run& run) {
   verb->add_option("A", a->image[0], "image 0")->type_name("IMAGE");
   verb->add_option("B", a->image[1], "image 1")->type_name("IMAGE");
   a->recording.add_to(*verb);
-  a->cameras.add_to(*verb);
+  a->cameras.add_to(*verb, true);
   verb->add_option("--truth", a->truth, "known R, t, baseline, depth0 (YAML) to compare with")
       ->type_name("FILE");
   verb->add_option("--rerun", a->rerun, "also write a file for Rerun's viewer (needs rerun-sdk)")

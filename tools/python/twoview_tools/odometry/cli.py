@@ -9,8 +9,8 @@ import sys
 import tempfile
 
 from .. import ROOT
-from . import (copies, endurance, evaluate, faults, flights, instructions, mapper, orbslam, poses,
-               runs, sensors, sets, tables, targets, tour)
+from . import (copies, endurance, evaluate, faults, flights, instructions, mapper, no_camera,
+               orbslam, poses, runs, sensors, sets, tables, targets, tour)
 
 FLIGHT_FOLDER = os.path.join(ROOT, ".cache", "flights")
 # The sources that faults are put into: one real and quick, one rendered; and what other_room shows.
@@ -53,6 +53,9 @@ def arguments_of(argv):
                         help="instructions a frame on ARM, under qemu")
     parser.add_argument("--colmap", action="store_true",
                         help="the keyframes of each set and flight through COLMAP's mapper (slow)")
+    parser.add_argument("--no-camera", action="store_true",
+                        help="run each source twice, with its camera and without any (--focal-35mm "
+                             "auto), and print a table of the focal lengths, and nothing else")
     parser.add_argument("--option", action="append", default=[], metavar="TEXT",
                         help="an option for the program, such as --option=--every=2")
     parser.add_argument("--keep", metavar="DIR", help="keep the runs' files below this folder")
@@ -164,6 +167,23 @@ def more_figures(arguments, runs_of, scratch):
             name)
 
 
+def without_camera(arguments, scratch):
+    """Prints what is found without a camera, and what it costs. Returns the exit status."""
+    rows = []
+    for _, label, folder in sources_of(arguments, scratch):
+        print(f"twoview: {label} without a camera", file=sys.stderr, flush=True)
+        rows.append(no_camera.compare(label, folder, os.path.join(scratch, label),
+                                      runs.program_path(arguments.program), arguments.option))
+    print(no_camera.table(rows))
+    sentences = list(no_camera.judged(rows))
+    for reached, text in sentences:
+        print(f"  {'yes' if reached else 'NO '}  {text}")
+    if arguments.json:
+        with open(arguments.json, "w", encoding="utf-8") as file:
+            json.dump({"films": rows}, file, indent=1)
+    return 0 if all(reached for reached, _ in sentences) else 1
+
+
 def report(found, peers, more=()):
     """Prints the tables and targets; `more`: further (reached, sentence). Returns the judgements,
     and whether every measured target is reached."""
@@ -194,6 +214,8 @@ def main(argv=None):
         return 0
     scratch = arguments.keep or tempfile.mkdtemp(prefix="twoview-odometry-")
     try:
+        if arguments.no_camera:
+            return without_camera(arguments, scratch)
         found, peers, first = [], [], []
         for kind, label, folder in sources_of(arguments, scratch):
             for seed in seeds_of(arguments):
