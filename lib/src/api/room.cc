@@ -186,7 +186,7 @@ tv_status tv_room_add(tv_room* room, const tv_camera* camera, const double R[9],
   const tv_status status = tv::read_view(room, camera, R, t, map, &view);
   if (status != TV_OK) return status;
   if (room->num_maps == TV_ROOM_MAX_MAPS) return TV_ERR_LIMITS;
-  if (!tv::make_near_blocks(*room, view)) return TV_ERR_CAPACITY;
+  if (!tv::list_near_blocks(*room, view, true)) return TV_ERR_CAPACITY;
   tv::add_view(*room, view);
   room->records[room->num_records++] = {tv::digest_of(view), room->num_calls, 0};
   ++room->num_maps;
@@ -200,7 +200,7 @@ tv_status tv_room_remove(tv_room* room, const tv_camera* camera, const double R[
   if (status != TV_OK) return status;
   int32_t k = tv::record_of(*room, view);
   if (k < 0) return TV_ERR_ARGUMENT;
-  tv::find_near_blocks(*room, view);
+  tv::list_near_blocks(*room, view, false);
   tv::subtract_view(*room, view, room->records[k].added_at);
   --room->num_maps;
   --room->num_records;

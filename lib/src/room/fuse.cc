@@ -109,7 +109,7 @@ bool pixel_of(const RoomView& view, const Vec3& point, double* u, double* v) {
 bool contribution(const Fusion& f, const Vec3& point, bool near, Voxel* added) {
   double u, v;
   if (!pixel_of(f.view, point, &u, &v)) return false;
-  int32_t x, y;
+  int32_t x = 0, y = 0;
   const Measured m = nearest_known(f, u, v, &x, &y);
   if (m.weight == 0) return false;
   const double range = std::sqrt((point[0] * point[0] + point[1] * point[1]) + point[2] * point[2]);
@@ -299,11 +299,12 @@ uint64_t digest_of(const RoomView& view) {
   return digest_rows(digest, map.pixels, width * channels, map.pixel_stride_bytes, map.height);
 }
 
-bool make_near_blocks(tv_room& room, const RoomView& view) {
+bool list_near_blocks(tv_room& room, const RoomView& view, bool make) {
   ++room.num_calls;
   room.num_near = 0;
-  const bool made = visit_near(fusion_of(room, view), [&room](uint64_t key) {
+  const bool listed = visit_near(fusion_of(room, view), [&room, make](uint64_t key) {
     int32_t index = find_block(room, key);
+    if (index < 0 && !make) return true;
     if (index < 0) index = make_block(room, key);
     if (index < 0) return false;
     Block& block = room.blocks[index];
@@ -311,23 +312,10 @@ bool make_near_blocks(tv_room& room, const RoomView& view) {
     block.used_at = room.num_calls;
     return true;
   });
-  for (int32_t k = 0; !made && k < room.num_near; ++k) {
+  for (int32_t k = 0; !listed && k < room.num_near; ++k) {
     if (room.blocks[room.near[k]].born_at == room.num_calls) free_block(room, room.near[k]);
   }
-  return made;
-}
-
-void find_near_blocks(tv_room& room, const RoomView& view) {
-  ++room.num_calls;
-  room.num_near = 0;
-  visit_near(fusion_of(room, view), [&room](uint64_t key) {
-    const int32_t index = find_block(room, key);
-    if (index < 0) return true;
-    Block& block = room.blocks[index];
-    if (block.used_at != room.num_calls) room.near[room.num_near++] = index;
-    block.used_at = room.num_calls;
-    return true;
-  });
+  return listed;
 }
 
 void add_view(tv_room& room, const RoomView& view) { fuse(room, view, room.num_calls, false); }

@@ -25,12 +25,9 @@ Measured measured_at(const tv_room& room, const RoomView& view, int32_t x, int32
 // A number that tells views apart by their contents.
 uint64_t digest_of(const RoomView& view);
 
-// Makes the blocks near the view's surface that the room lacks, and lists all of them in room.near.
-// Returns false, and leaves the room as it was, where there is no memory for them.
-bool make_near_blocks(tv_room& room, const RoomView& view);
-
-// Lists those that exist.
-void find_near_blocks(tv_room& room, const RoomView& view);
+// Lists the blocks near the view's surface in room.near. make: those that the room lacks are made;
+// where there is no memory for them, it returns false and leaves the room as it was.
+bool list_near_blocks(tv_room& room, const RoomView& view, bool make);
 
 // Adds the view's contributions to the blocks of room.near, and to what it sees through in all
 // others; or subtracts them, with what it saw through in those that existed when it was added.
