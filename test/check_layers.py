@@ -52,7 +52,7 @@ ROOMS = {
     "pair": {"files", "base"},
     "pictures": {"pair", "files", "base"},
     "report": {"pictures", "pair", "files", "base"},
-    "calibration": {"pictures", "files", "base"},
+    "calibration": {"sources", "pictures", "files", "base"},
     "recording": {"pair", "files", "base"},
     "verbs": {"recording", "calibration", "report", "pictures", "pair", "files", "base"},
     "drone": {"sources", "recording", "files", "base"},

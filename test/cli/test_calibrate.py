@@ -349,11 +349,24 @@ class Views(CalibrateTest):
     def test_a_folder_in_place_of_its_pictures(self):
         self.refuse(self.folder, words=["is a folder", f"{self.folder}/*.jpg"])
 
-    def test_images_of_different_sizes(self):
+    def test_images_that_cannot_be_read_or_are_of_another_size_are_left_out(self):
         small = self.save("small.png", cv2.resize(self.images[0], (320, 240)))
-        self.refuse(
-            *self.names[:2], small, words=["small.png is 320x240", "640x480", "one resolution"]
-        )
+        cut = self.write("cut.png", Path(self.names[0]).read_bytes()[:5000])
+        hidden = self.write("._0.png", b"\0\5\x16\7")
+        given = (small, *self.names, cut, hidden)
+        done = self.succeed(self.calibrate(*given))
+        text = done.stdout.decode()
+        for line in ("small.png  another size: 320x240, most are 640x480",
+                     "cut.png    cannot be read: image ", "._0.png    cannot be read: image "):
+            self.assertIn(line, text)
+        result = json.loads((self.out / "calibration.json").read_text())
+        status = {view["name"]: view["status"] for view in result["views"]}
+        self.assertEqual([status[name] for name in ("small.png", "cut.png", "._0.png")],
+                         ["other_size", "unreadable", "unreadable"])
+        alone = self.calibrated(*self.names)
+        self.assertEqual(result["intrinsics"], alone["intrinsics"])
+        self.refuse(cut, hidden, words=["cut.png is truncated"])
+        self.refuse(*self.names, "absent.png", words=["absent.png", "No such file"])
 
     def test_one_view_only(self):
         self.refuse(self.names[0], words=["only 1 different view", "in 1 image:", "at least 3"])
@@ -383,7 +396,7 @@ class Views(CalibrateTest):
 
     def test_no_video_at_all(self):
         self.refuse("--video", "none.avi", words=["none.avi", "No such file"])
-        self.refuse("--video", self.write("t.avi", "hello there"), words=["t.avi", "no video"])
+        self.refuse("--video", self.write("t.avi", "hello there"), words=["t.avi", "no film"])
         self.refuse("--video", self.folder, words=["not a file"])
         self.refuse("--video", "/dev/video97", words=["/dev/video97", "cannot be opened"])
         self.refuse(words=["either images or --video"])

@@ -13,6 +13,7 @@
 #include "base/error.h"
 #include "files/camera_formats.h"
 #include "files/camera_set.h"
+#include "files/natural_order.h"
 #include "files/pairs_file.h"
 
 // unity.h comes after all other headers: it defines isnan and isinf as macros.
@@ -170,6 +171,25 @@ int num_wrong_choices() {
   return wrong;
 }
 
+// Every pair of names in both orders, so that the order is one and does not depend on a sort.
+int num_wrong_orders() {
+  int wrong = 0;
+  const Json file = load("names.json");
+  for (const Json& test : file["cases"]) {
+    const auto names = test["names"].get<std::vector<std::string>>();
+    for (size_t i = 0; i < names.size(); ++i)
+      for (size_t j = 0; j < names.size(); ++j) {
+        if (comes_before(names[i], names[j]) == (i < j)) continue;
+        ++wrong;
+        std::printf("names.json: %s: %s, %s\n", test["name"].get<std::string>().c_str(),
+                    names[i].c_str(), names[j].c_str());
+      }
+  }
+  return wrong;
+}
+
+void test_names_are_in_the_cases_order() { TEST_ASSERT_EQUAL_INT(0, num_wrong_orders()); }
+
 void test_pairs_files_are_read_as_the_cases_say() {
   TEST_ASSERT_EQUAL_INT(0, num_wrong("pairs.json", pairs_json));
 }
@@ -202,5 +222,6 @@ int main(void) {
   RUN_TEST(test_camera_sets_are_read_as_the_cases_say);
   RUN_TEST(test_files_of_every_format_are_read_as_the_cases_say);
   RUN_TEST(test_the_entry_that_serves_an_image_is_the_cases);
+  RUN_TEST(test_names_are_in_the_cases_order);
   return UNITY_END();
 }

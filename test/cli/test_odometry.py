@@ -392,15 +392,19 @@ class OdometryTest(CliTest):
         for k in range(2):
             self.write(f"wide/{k}.png", wide)
         run = ("wide", "--fps", 10, "--focal-35mm", 26)
+        note = "frames above 2048 pixels a side are used as they are: 2049x48; --resize 1600 " \
+               "is advised"
         done = self.odometry(*run)
-        note = b"twoview: note: frames above 2048 pixels a side are used as they are: 2049x48; " \
-               b"--resize 1600 is advised\n"
-        self.assertEqual(done.stderr.count(note), 1)
+        self.assertEqual(done.stdout.decode().count(f"note         {note}\n"), 1)
+        self.assertNotIn("note", done.stderr.decode())
+        self.assertEqual(self.result()["notes"], [note])
+        self.assertIn(f"<li>{note}</li>", (self.out / "report.html").read_text())
         for more in (("--resize", 0), ("--resize", 1600)):
-            self.assertNotIn(b"note", self.odometry(*run, *more).stderr)
-        done = self.odometry(*run, "--json")
-        self.assertIn(note, done.stderr)
-        self.assertEqual(json.loads(done.stdout)["options"]["resize"], 0)
+            self.assertNotIn(b"note", self.odometry(*run, *more).stdout)
+            self.assertEqual(self.result()["notes"], [])
+        for flag in ("--json", "--quiet"):
+            self.assertIn(f"twoview: note: {note}\n", self.odometry(*run, flag).stderr.decode())
+        self.assertEqual(self.result()["options"]["resize"], 0)
 
     def test_options_are_written_and_refused_as_those_of_the_other_verbs(self):
         text = " ".join(self.run_program("odometry", "--help").stdout.decode().split())
@@ -715,8 +719,10 @@ distortion_coefficients: [0, 0, 0, 0]
         (source / "images/00012.png").write_bytes(b"no picture")
         self.write("set/images/00013.png", png(64, 64, bytes(64 * 64)))
         done = self.succeed(self.odometry(source))
-        self.one_line(done, "2 frames could not be used", "00012.png")
         result = self.result()
+        self.assertIn("2 frames could not be used, the first: ", result["notes"][0])
+        self.assertIn("00012.png", result["notes"][0])
+        self.assertIn(result["notes"][0].encode(), done.stdout)
         self.assertEqual((result["num_frames"], result["num_unreadable"]), (COUNT, 2))
         rows = (self.out / "frames.csv").read_text().splitlines()
         self.assertIn(",lost,unreadable,-1,", rows[13])
@@ -867,7 +873,6 @@ distortion_coefficients: [0, 0, 0, 0]
         refused("line 1", "not a time", text="nan images/00000.png\n")
         refused("line 4", "not later", text="\n".join(lines[:3] + lines[2:]))
         refused("absent.png", text="0 images/absent.png\n")
-        refused("no image", "00000.png", name="images/00000.png", text="no image")
         refused("cameras.yaml", "fx", name="cameras.yaml", text=CAMERAS.replace("fx", "gx"))
         refused("320x240", "640x240", name="cameras.yaml", text=CAMERAS.replace(": 320", ": 640"))
         refused("line 1", "7 numbers", name="groundtruth.txt", text="0 0 0 0 0 0 0\n")

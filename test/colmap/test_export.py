@@ -419,7 +419,7 @@ def test_images_and_folders_that_are_missing_or_broken(photographs, tmp_path, re
     (images / "b.png").write_bytes((photographs / "images" / "b.png").read_bytes()[:100])
     refuse("no camera for it", *arguments)
     (tmp_path / "cameras.yaml").write_text(CAMERA)
-    refuse("b.png: not an image", *arguments)
+    refuse("b.png is no image", *arguments)
     (tmp_path / "cameras.yaml").write_text(CAMERA.replace(str(WIDTH), "641"))
     refuse("a.png is 640x480, but its camera is for 641x480", *arguments)
     (tmp_path / "cameras.yaml").write_text(CAMERA.replace("fx: 520", "fx: wide"))
@@ -520,6 +520,19 @@ def test_pictures_that_are_not_read_are_named(photographs, tmp_path, call, refus
     (tmp_path / "x.db").unlink()
     status, _, err = call(*base)
     assert status == 2 and f"{NAMES[0]} is a HEIC picture" in err
+
+
+def test_hidden_and_damaged_pictures_are_left_out(photographs, tmp_path, call):
+    for name in NAMES[:2]:
+        shutil.copy(photographs / "images" / name, tmp_path / name)
+    (tmp_path / f"._{NAMES[0]}").write_bytes(b"\0\5\x16\7")
+    (tmp_path / "zz.png").write_bytes((tmp_path / NAMES[0]).read_bytes()[:900])
+    status, out, err = call("export", "--database", tmp_path / "x.db", "--images", tmp_path,
+                            "--focal-35mm", "28", "--schema", "3.8", "--json")
+    assert status == 0, err
+    assert json.loads(out)["images"] == 2 and json.loads(out)["pairs"] == 1
+    assert f"1 picture of {tmp_path} is left out: ._{NAMES[0]} is a hidden file" in err
+    assert f"1 picture of {tmp_path} is left out: zz.png " in err
 
 
 def test_bad_arguments_are_one_line(tmp_path, refuse):

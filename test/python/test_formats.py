@@ -12,6 +12,7 @@ except ImportError as missing:
     raise unittest.SkipTest(f"{missing}: run scripts/bootstrap test")
 
 from twoview_tools import formats
+from twoview_tools.folders import natural_key
 
 FOLDER = pathlib.Path(__file__).resolve().parents[1] / "formats"
 
@@ -100,6 +101,14 @@ class TestChoice(unittest.TestCase):
         with self.assertRaisesRegex(formats.FormatError, "x.png"):
             formats.choose_camera(cameras, "x.png")
         self.assertIsNone(formats.choose_camera({}, "x.png"))
+
+
+class TestNames(unittest.TestCase):
+    def test_names_are_in_the_cases_order(self):
+        for case, _ in cases("names"):
+            with self.subTest(case=case["name"]):
+                for names in (case["names"][::-1], sorted(case["names"])):
+                    self.assertEqual(sorted(names, key=natural_key), case["names"])
 
 
 class TestFiles(unittest.TestCase):

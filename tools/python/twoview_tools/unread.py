@@ -25,10 +25,7 @@ def unread_picture(path):
     return ""
 
 
-def left_out(folder, names):
-    """A line on those of these files that are pictures of such formats; "" if there are none."""
-    lines = [f"{name} {what}" for name in names if name.lower().endswith(ENDINGS)
-             for what in [unread_picture(os.path.join(folder, name))] if what]
-    if len(lines) > 1:
-        return f"{len(lines)} pictures of {folder} are left out, the first: {lines[0]}"
-    return f"1 picture of {folder} is left out: {lines[0]}" if lines else ""
+def unread_pictures(folder, names):
+    """[(name, what it is)] of those of these files that are pictures of such formats."""
+    return [(name, what) for name in names if name.lower().endswith(ENDINGS)
+            for what in [unread_picture(os.path.join(folder, name))] if what]

@@ -120,6 +120,21 @@ bool OutputSet::is_kept(const fs::path& path) const {
   });
 }
 
+void OutputSet::require_own(const Own& own) const {
+  std::error_code ignored;
+  const auto is_there = [&](const std::string& name) {
+    return fs::is_regular_file(folder_ / name, ignored);
+  };
+  const bool is_own = std::all_of(own.always.begin(), own.always.end(), is_there) &&
+                      std::none_of(own.never.begin(), own.never.end(), is_there);
+  if (is_own) return;
+  for (const std::string& name : own.names)
+    if (is_there(name) && !is_kept(folder_ / name))
+      throw BadInput("folder " + folder_.string() + " holds " + name +
+                     ", which is not of an earlier run of twoview " + own.verb +
+                     ": give another -o");
+}
+
 void OutputSet::add(const std::string& name, std::string_view bytes) {
   const fs::path target = folder_ / name;
   struct stat info;

@@ -30,6 +30,16 @@ class OutputSet {
   // Whether this name in the folder is a file that keep() protects.
   bool is_input(const std::string& name) const { return is_kept(folder_ / name); }
 
+  // Refuses a folder that holds something else's results: throws BadInput where one of these names,
+  // which the verb may write or delete, is there, but the files that every run of the verb leaves
+  // are not, or one is there that none of its runs leaves. So a verb replaces its own earlier
+  // results and nothing else. Call it before the work.
+  struct Own {
+    const char* verb;
+    std::vector<std::string> names, always, never;
+  };
+  void require_own(const Own& own) const;
+
   void add(const std::string& name, std::string_view bytes);
   void commit();
 
@@ -78,10 +88,12 @@ void print(std::string_view text);
 // Returns a line of a summary, with its name in a column of fixed width.
 template <class... T>
 std::string summary_line(const char* name, const char* format, T... values) {
-  char head[32], text[512];
+  char head[32];
   std::snprintf(head, sizeof head, "%-13s", name);
-  std::snprintf(text, sizeof text, format, values...);
-  return head + std::string(text) + "\n";
+  const int length = std::snprintf(nullptr, 0, format, values...);  // a note may be long
+  std::string text(static_cast<size_t>(length > 0 ? length : 0), '\0');
+  std::snprintf(text.data(), text.size() + 1, format, values...);
+  return head + text + "\n";
 }
 
 }  // namespace cli

@@ -1,6 +1,7 @@
-// What is shown on a terminal only: colours, and the progress of long work.
+// What depends on the terminal: colours, and the progress of long work.
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <mutex>
 #include <string>
@@ -17,8 +18,9 @@ bool takes_colours(int descriptor);
 bool shows_progress(int descriptor);
 
 // Shows the progress of long work as one line on stderr: each line replaces the last one, is cut to
-// the terminal's width, and the destructor erases it. Shows nothing unless stderr is a terminal and
-// TERM is not "dumb".
+// the terminal's width, and the destructor erases it. Where stderr is no terminal, or TERM is
+// "dumb", a line of its own comes every 30 s, so that a log shows that the work goes on;
+// TWOVIEW_PROGRESS_SECONDS is another time, and 0 stands for no such lines.
 class Progress {
  public:
   explicit Progress(bool wanted);
@@ -28,7 +30,10 @@ class Progress {
   void tell(const std::string& text) const;
 
  private:
+  using Clock = std::chrono::steady_clock;
   bool shown_;
+  double line_every_s_ = 0;  // without a terminal; 0: never
+  mutable Clock::time_point last_line_ = Clock::now();
 };
 
 // Shows "TEXT: 12 s" in the same way, once a second, until it is destroyed: for one long call that

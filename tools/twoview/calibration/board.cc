@@ -188,6 +188,11 @@ void look_for_any_board(const cv::Mat& small, cv::Size inner, Found& found) {
   cv::Size seen = meta.size();
   if ((seen.width < seen.height) != (inner.width < inner.height))
     std::swap(seen.width, seen.height);
+  // A grid of our size that the search for our board refused is a part of it beside something else.
+  if (seen == inner) {
+    found.reason = Reason::kPartialBoard;
+    return;
+  }
   found.seen_width = seen.width;
   found.seen_height = seen.height;
   const bool holds_ours = seen.width >= inner.width && seen.height >= inner.height;
@@ -233,7 +238,7 @@ Found search(const cv::Mat& luma, cv::Size inner, Search how, Corners& corners) 
   if (!squares_alternate(luma, grid) || is_part_of_a_larger_board(luma, grid)) {
     corners.clear();
     look_for_any_board(small, inner, found);
-    found.reason = Reason::kOtherBoard;
+    if (found.reason != Reason::kPartialBoard) found.reason = Reason::kOtherBoard;
     return found;
   }
   begin_with_a_dark_square(luma, inner, corners);
@@ -331,9 +336,9 @@ std::string number(double value, const char* unit) {
 }  // namespace
 
 const char* reason_name(Reason reason) {
-  constexpr const char* names[] = {"used",        "too_dark",   "no_board", "partial_board",
-                                   "other_board", "time_limit", "blurred",  "duplicate",
-                                   "surplus",     "outlier"};
+  constexpr const char* names[] = {"used",        "too_dark",   "no_board",   "partial_board",
+                                   "other_board", "time_limit", "blurred",    "duplicate",
+                                   "surplus",     "outlier",    "unreadable", "other_size"};
   return names[static_cast<int>(reason)];
 }
 
@@ -347,7 +352,9 @@ const char* reason_words(Reason reason) {
                                    "blurred",
                                    "as an earlier view",
                                    "more than --max-views",
-                                   "error too large"};
+                                   "error too large",
+                                   "cannot be read",
+                                   "another size"};
   return words[static_cast<int>(reason)];
 }
 

@@ -16,13 +16,15 @@ enum class Reason {
   kUsed,
   kTooDark,       // no board found, and hardly any pixel is above black
   kNoBoard,       // no chessboard found
-  kPartialBoard,  // a chessboard with fewer inner corners than requested
+  kPartialBoard,  // a chessboard with fewer inner corners than requested, or a cut-off one
   kOtherBoard,    // a chessboard with more inner corners, or a part of a larger one
   kTimeLimit,     // the search reached its time limit, or crashed
   kBlurred,       // the edges rise too slowly to locate a corner
   kDuplicate,     // the board has the position of an earlier view
   kSurplus,       // --max-views other views are used
-  kOutlier        // its reprojection error is far above the median
+  kOutlier,       // its reprojection error is far above the median
+  kUnreadable,    // the picture cannot be read
+  kOtherSize      // the picture is of another size than most
 };
 const char* reason_name(Reason reason);   // for JSON, such as "partial_board"
 const char* reason_words(Reason reason);  // for people, such as "a part of the board"

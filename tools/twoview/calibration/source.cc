@@ -10,7 +10,9 @@
 
 #include "base/error.h"
 #include "base/output.h"
+#include "files/folder.h"
 #include "files/image_file.h"
+#include "sources/film.h"
 
 namespace cli {
 namespace {
@@ -28,10 +30,7 @@ std::string size_text(cv::Size size) {
 cv::Mat grey_frame(const cv::Mat& frame, const std::string& name) {
   if (frame.empty() || frame.depth() != CV_8U || frame.cols > kMaxSide || frame.rows > kMaxSide)
     throw BadInput("video " + name + " has frames that cannot be used");
-  if (frame.channels() == 1) return frame;
-  cv::Mat grey;
-  cv::cvtColor(frame, grey, frame.channels() == 4 ? cv::COLOR_BGRA2GRAY : cv::COLOR_BGR2GRAY);
-  return grey;
+  return luma_of(frame);
 }
 
 // Without this, libav prints lines of its own on stderr.
@@ -45,17 +44,34 @@ std::string frame_name(int64_t index) {
 
 }  // namespace
 
-void read_images(const std::vector<std::string>& paths, const TakeFrame& take) {
-  cv::Size size;
+void read_images(const std::vector<std::string>& paths, const TakeFrame& take,
+                 const LeaveOut& leave_out) {
+  std::vector<cv::Size> sizes;
+  for (const std::string& path : paths) sizes.push_back(header_size(path));
+  cv::Size usual = most_frequent(sizes);
+  std::string first_problem;
+  int num_taken = 0;
   for (const std::string& path : paths) {
-    const Picture picture = load_picture(path);
-    if (size.area() == 0) size = picture.luma.size();
-    if (picture.luma.size() != size)
-      throw BadInput("image " + path + " is " + size_text(picture.luma.size()) + ", but " +
-                     paths[0] + " is " + size_text(size) +
-                     ": take all with one camera at one resolution, and do not turn or crop them");
+    const std::string name = std::filesystem::path(path).filename().string();
+    Picture picture;
+    try {
+      picture = load_picture(path);
+    } catch (const BadInput& e) {
+      std::error_code error;
+      if (!std::filesystem::exists(path, error)) throw;  // a name that was not meant
+      if (first_problem.empty()) first_problem = e.what();
+      leave_out(name, true, e.what());
+      continue;
+    }
+    if (usual.area() == 0) usual = picture.luma.size();  // no header tells
+    if (picture.luma.size() != usual) {
+      leave_out(name, false, size_text(picture.luma.size()) + ", most are " + size_text(usual));
+      continue;
+    }
+    ++num_taken;
     if (!take(picture.luma, picture.name)) return;
   }
+  if (num_taken == 0) throw BadInput(first_problem);
 }
 
 bool is_live(const std::string& video) {
@@ -65,34 +81,37 @@ bool is_live(const std::string& video) {
          video.find("://") != std::string::npos;
 }
 
-void read_video_file(const std::string& path, const TakeFrame& take) {
+std::vector<std::string> read_video_file(const std::string& path, const TakeFrame& take) {
   std::error_code error;
   if (!std::filesystem::exists(path, error))
     throw BadInput("video " + path + ": No such file or directory");
   if (!std::filesystem::is_regular_file(path, error))
     throw BadInput("video " + path + " is not a file");
-  silence_decoders();
-  cv::VideoCapture video(path, cv::CAP_FFMPEG);
-  if (!video.isOpened())
-    throw BadInput("video " + path +
-                   " is no video that can be read, or is cut off: record or copy it again");
-  const double promised = video.get(cv::CAP_PROP_FRAME_COUNT);
-  const double fps = video.get(cv::CAP_PROP_FPS);
+  Film video(path);
+  const FilmFacts& facts = video.facts();
+  std::vector<std::string> notes;
+  if (const std::string stored = stored_words(facts); !stored.empty())
+    notes.push_back(stored + ": the camera is of such pictures");
+  if (facts.pixel_aspect != 1)
+    notes.push_back("the video's pixels are not square, so fx and fy of the camera differ");
+  const auto promised = static_cast<double>(video.num_promised());
+  const double fps = facts.rate_hz;
   double step = fps > 1 && fps < 1000 ? fps / kLooksPerSecond : 6;
-  if (promised > 0 && promised < 1e9) step = std::max(step, promised / kMaxLooks);
+  step = std::max(step, promised / kMaxLooks);
   const auto stride = std::max<int64_t>(1, std::llround(step));
   int64_t index = 0;
   int num_looks = 0;
-  for (; index < kMaxFrames && video.grab(); ++index) {
+  for (; index < kMaxFrames && video.next(); ++index) {
     if (index % stride != 0) continue;
-    cv::Mat frame;
-    if (!video.retrieve(frame)) break;
-    if (++num_looks > kMaxLooks || !take(grey_frame(frame, path), frame_name(index))) return;
+    const cv::Mat frame = video.picture();
+    if (frame.empty()) break;
+    if (++num_looks > kMaxLooks || !take(grey_frame(frame, path), frame_name(index))) return notes;
   }
-  if (promised > 0 && promised < 1e9 && static_cast<double>(index) < kMinShareOfFrames * promised)
+  if (static_cast<double>(index) < kMinShareOfFrames * promised)
     throw BadInput("video " + path + " ends early, after " + std::to_string(index) + " of " +
                    std::to_string(std::llround(promised)) +
                    " frames: copy or record it again, or save its good frames as images");
+  return notes;
 }
 
 void read_live(const std::string& device, double duration_s, const TakeFrame& take) {

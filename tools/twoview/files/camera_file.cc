@@ -39,12 +39,13 @@ bool has_shape(const tv_camera& camera, int width, int height) {
 
 }  // namespace
 
-tv_camera film_camera(double focal_35mm, int width, int height) {
+tv_camera film_camera(double focal_35mm, int width, int height, double pixel_aspect) {
   tv_camera camera{};
   camera.model = TV_CAMERA_PINHOLE;
   camera.width = width;
   camera.height = height;
-  camera.fx = camera.fy = focal_35mm * std::hypot(width, height) / std::hypot(36.0, 24.0);
+  camera.fy = focal_35mm * std::hypot(width * pixel_aspect, height) / std::hypot(36.0, 24.0);
+  camera.fx = camera.fy / pixel_aspect;
   camera.cx = (width - 1) / 2.0;
   camera.cy = (height - 1) / 2.0;
   return camera;

@@ -23,8 +23,9 @@ std::string camera_yaml(const tv_camera& camera);
 
 // A pinhole camera from the focal length for 35 mm film (EXIF's FocalLengthIn35mmFilm), which is
 // defined by an equal angle across the image diagonal, 43.27 mm on film (CIPA DCG-001). The
-// principal point is the middle of the image.
-tv_camera film_camera(double focal_35mm, int width, int height);
+// principal point is the middle of the image. pixel_aspect is the width of a pixel over its height:
+// the diagonal is that of the picture as it is shown.
+tv_camera film_camera(double focal_35mm, int width, int height, double pixel_aspect = 1);
 
 // Throws BadInput that names both sizes if the camera's image size is another one.
 void require_size(const tv_camera& camera, const std::string& camera_name, int width, int height,

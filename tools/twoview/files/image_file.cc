@@ -1,5 +1,7 @@
 #include "files/image_file.h"
 
+#include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -16,6 +18,8 @@ namespace cli {
 namespace {
 
 constexpr size_t kMaxFileBytes = size_t{1} << 30;
+constexpr const char* kRawWords =
+    "is a camera's raw picture, which is not read: develop it to TIFF, PNG or JPEG";
 
 std::string size_text(int64_t width, int64_t height) {
   return std::to_string(width) + "x" + std::to_string(height);
@@ -35,8 +39,63 @@ std::string film_instead(std::string_view bytes) {
   return "";
 }
 
+// Converts samples so that `low` becomes 0 and `high` 255, rounded; beyond them they are cut off.
+template <class Sample>
+cv::Mat to_8_bits(const cv::Mat& pixels, int64_t low, int64_t high) {
+  cv::Mat result(pixels.size(), CV_MAKETYPE(CV_8U, pixels.channels()));
+  const int count = pixels.cols * pixels.channels();
+  const int64_t range = high - low;
+  for (int y = 0; y < pixels.rows; ++y) {
+    const Sample* from = pixels.ptr<Sample>(y);
+    uint8_t* to = result.ptr<uint8_t>(y);
+    for (int i = 0; i < count; ++i) {
+      const int64_t above = std::clamp<int64_t>(from[i] - low, 0, range);
+      to[i] = static_cast<uint8_t>((510 * above + range) / (2 * range));
+    }
+  }
+  return result;
+}
+
+// The samples of which 0.5 and 99.5 % of all are at most as large (nearest rank).
+std::pair<int64_t, int64_t> percentiles(const cv::Mat& pixels) {
+  std::vector<int64_t> counts(65536, 0);
+  const int row = pixels.cols * pixels.channels();
+  for (int y = 0; y < pixels.rows; ++y) {
+    const uint16_t* samples = pixels.ptr<uint16_t>(y);
+    for (int i = 0; i < row; ++i) ++counts[samples[i]];
+  }
+  const int64_t all = int64_t{pixels.rows} * row;
+  const auto at = [&](int64_t per_mille) {
+    const int64_t rank = std::max<int64_t>(1, (per_mille * all + 999) / 1000);
+    int64_t sum = 0, value = 0;
+    while ((sum += counts[static_cast<size_t>(value)]) < rank) ++value;
+    return value;
+  };
+  return {at(5), at(995)};
+}
+
+// 8 bits of 16: over the whole range that the file can hold, or, where the picture uses less than
+// half of it (a thermal camera, 12 bits in 16), from the 0.5 to the 99.5 percentile.
+cv::Mat reduced(const cv::Mat& pixels, int64_t white, bool& is_stretched) {
+  const auto [low, high] = percentiles(pixels);
+  is_stretched = high > low && 2 * (high - low) < white;
+  return is_stretched ? to_8_bits<uint16_t>(pixels, low, high)
+                      : to_8_bits<uint16_t>(pixels, 0, white);
+}
+
+bool is_raw_name(const std::string& path) {
+  std::string ending = std::filesystem::path(path).extension().string();
+  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  for (const char* raw :
+       {".dng", ".cr2", ".cr3", ".nef", ".nrw", ".arw", ".raf", ".orf", ".rw2", ".pef", ".srw"})
+    if (ending == raw) return true;
+  return false;
+}
+
 // Decodes all pixels of a file's bytes with the file's depth and channels. Throws BadInput.
 cv::Mat decode(const std::string& path, const std::string& bytes) {
+  // Many are TIFF files, of which OpenCV decodes the small preview.
+  if (is_raw_name(path)) throw BadInput("image " + path + " " + kRawWords);
   const ImageHeader header = read_image_header(bytes);
   const auto refuse_huge = [&](int64_t width, int64_t height) {
     if (width > kMaxSide || height > kMaxSide)
@@ -63,26 +122,10 @@ cv::Mat decode(const std::string& path, const std::string& bytes) {
                    (header.width > 0 ? " is damaged" : " is no image that can be read"));
   }
   refuse_huge(pixels.cols, pixels.rows);
+  // OpenCV (4.6 to 5.0) scales 8-bit PNM files of numbers by their largest sample, binary ones not.
+  if (header.is_binary_pnm && header.max_sample > 0 && header.max_sample < 255)
+    pixels = to_8_bits<uint8_t>(pixels, 0, header.max_sample);
   return pixels;
-}
-
-// How many bits the largest 16-bit sample has.
-int bits_in_use(const cv::Mat& pixels) {
-  double largest = 0;
-  cv::minMaxLoc(pixels.reshape(1), nullptr, &largest);
-  return largest >= 1 ? static_cast<int>(std::floor(std::log2(largest))) + 1 : 0;
-}
-
-// Converts 16-bit samples v to round(v / 257), which maps 0 to 0 and 65535 to 255.
-cv::Mat to_8_bits(const cv::Mat& pixels) {
-  cv::Mat result(pixels.size(), CV_MAKETYPE(CV_8U, pixels.channels()));
-  const int count = pixels.cols * pixels.channels();
-  for (int y = 0; y < pixels.rows; ++y) {
-    const uint16_t* from = pixels.ptr<uint16_t>(y);
-    uint8_t* to = result.ptr<uint8_t>(y);
-    for (int i = 0; i < count; ++i) to[i] = static_cast<uint8_t>((from[i] + 128) / 257);
-  }
-  return result;
 }
 
 }  // namespace
@@ -101,10 +144,16 @@ std::string unread_picture(std::string_view bytes) {
 }
 
 std::string unread_picture_file(const std::string& path) {
+  if (is_raw_name(path)) return kRawWords;
   char head[16] = "";
   std::ifstream file(path, std::ios::binary);
   file.read(head, sizeof head);
   return unread_picture({head, static_cast<size_t>(file.gcount())});
+}
+
+std::string stored_words(int turn_deg) {
+  return std::string("the pictures are used as they are stored, ") +
+         (turn_deg == 180 ? "upside down" : "lying on their side");
 }
 
 tv_image Picture::view() const {
@@ -137,24 +186,23 @@ Picture load_picture(const std::string& path) {
   const std::string bytes = read_file(path, kMaxFileBytes);
   cv::Mat pixels = checked_pixels(path, bytes);
   Picture picture;
+  if (pixels.channels() == 4) {
+    cv::Mat opaque;
+    cv::cvtColor(pixels, opaque, cv::COLOR_BGRA2BGR);
+    pixels = opaque;
+  }
   if (pixels.depth() == CV_16U) {
-    picture.used_bits = bits_in_use(pixels);
-    pixels = to_8_bits(pixels);
+    const int64_t said = read_image_header(bytes).max_sample;
+    pixels = reduced(pixels, said > 255 && said < 65535 ? said : 65535, picture.is_stretched);
   }
   picture.path = path;
   picture.name = std::filesystem::path(path).filename().string();
-  switch (pixels.channels()) {
-    case 1:
-      picture.luma = pixels;
-      cv::cvtColor(pixels, picture.colour, cv::COLOR_GRAY2BGR);
-      break;
-    case 4: {
-      cv::Mat opaque;
-      cv::cvtColor(pixels, opaque, cv::COLOR_BGRA2BGR);
-      pixels = opaque;
-      [[fallthrough]];
-    }
-    default: picture.colour = pixels; cv::cvtColor(pixels, picture.luma, cv::COLOR_BGR2GRAY);
+  if (pixels.channels() == 1) {
+    picture.luma = pixels;
+    cv::cvtColor(pixels, picture.colour, cv::COLOR_GRAY2BGR);
+  } else {
+    picture.colour = pixels;
+    cv::cvtColor(pixels, picture.luma, cv::COLOR_BGR2GRAY);
   }
   picture.file_width = pixels.cols;
   picture.file_height = pixels.rows;

@@ -21,8 +21,8 @@ struct Picture {
   cv::Mat mask;                         // of the size of luma, 0 where it is left out; may be empty
   int file_width = 0, file_height = 0;  // pixels, before resizing
   ExifFocal exif;
-  int turn_deg = 0;    // how far a viewer turns it clockwise, which is not done here
-  int used_bits = 16;  // bits of the largest sample of a 16-bit file: 12 for what is dark at 16
+  int turn_deg = 0;           // how far a viewer turns it clockwise, which is not done here
+  bool is_stretched = false;  // 16-bit samples that use less than half of their range
 
   tv_image view() const;
   tv_image mask_view() const;  // null data without a mask
@@ -32,11 +32,22 @@ struct Picture {
 };
 
 // Reads and decodes an image. Luma is OpenCV's BGR2GRAY, 0.299 R + 0.587 G + 0.114 B. 16-bit
-// samples are divided by 257 and rounded; alpha is dropped. An EXIF orientation is ignored, since
-// intrinsics refer to the pixels as they are stored. Throws BadInput for a file that is missing,
-// empty, no image, truncated, of another depth or number of channels, or larger than kMaxSide on a
-// side (checked in the header where the format is known).
+// samples are scaled so that white (65535, a PNM file's own largest sample) becomes 255, or, where
+// a picture uses less than half of that range, so that its 0.5 and 99.5 percentiles become 0 and
+// 255; alpha is dropped. An EXIF orientation is ignored, since intrinsics refer to the pixels as
+// they are stored. Throws BadInput for a file that is missing, empty, no image, truncated, of
+// another depth or number of channels, or larger than kMaxSide on a side (checked in the header
+// where the format is known).
 Picture load_picture(const std::string& path);
+
+// How pictures lie that a viewer turns by this many degrees: "the pictures are used as they are
+// stored, lying on their side".
+std::string stored_words(int turn_deg);
+
+// The note on pictures that are stretched.
+constexpr const char* kStretchedNote =
+    "16-bit pictures that use less than half of their range are stretched to 8 bits, each from its "
+    "0.5 to its 99.5 percentile";
 
 // Decodes all pixels without conversion: 8 or 16 bits, 1, 3 (BGR) or 4 (BGRA) channels. Throws
 // BadInput like load_picture.

@@ -92,6 +92,8 @@ ImageHeader read_pnm(Bytes bytes) {
   }
   header.width = values[0];
   header.height = values[1];
+  header.max_sample = count == 3 ? values[2] : 0;
+  header.is_binary_pnm = kind == '5' || kind == '6';
   const int64_t sample = values[2] > 255 ? 2 : 1;
   const size_t have = bytes.size() - (at < bytes.size() ? at + 1 : at);
   if (header.width > INT32_MAX || header.height > INT32_MAX) return header;

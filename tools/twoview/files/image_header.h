@@ -10,6 +10,8 @@ namespace cli {
 
 struct ImageHeader {
   int64_t width = 0, height = 0;  // 0 if unknown: another format, or cut within the header
+  int64_t max_sample = 0;         // PNM: the sample that is white; 0 for other formats
+  bool is_binary_pnm = false;     // P5 or P6
   bool truncated = false;         // the file ends early: PNG, JPEG, binary PNM
 };
 

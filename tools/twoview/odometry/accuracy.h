@@ -3,6 +3,7 @@
 // one frame to the next (Sturm et al., IROS 2012). The figures are those of the program evo.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "odometry/poses.h"
@@ -30,6 +31,8 @@ Similarity fitted(const std::vector<Vector3>& from, const std::vector<Vector3>& 
                   bool with_scale);
 
 struct Accuracy {
+  // Whether there are errors: a truth that stays in one place has no size to fit a similarity to.
+  bool has_errors() const { return num_poses >= 3 && path_length > 0; }
   size_t num_poses = 0;             // associated ones; below 3 nothing else is filled
   double ate_rmse = 0;              // in the truth's unit, after the similarity
   double ate_rigid_rmse = 0;        // after the best rigid motion, without a scale
@@ -40,6 +43,12 @@ struct Accuracy {
   std::vector<double> errors;  // of each associated pose, after the similarity
   std::vector<Association> pairs;
 };
+// Where fewer than three poses of the truth belong to poses of the estimate: takes its times as
+// those of another unit (s, ms, us, ns), or as of the film's own clock, which began at
+// film_start_s, where that makes them belong together. Returns a line on what was done, or on why
+// nothing meets; empty where enough poses meet as they are.
+std::string fit_times(const Trajectory& estimate, TruePoses& truth, double film_start_s);
+
 Accuracy accuracy_of(const Trajectory& estimate, const Trajectory& truth);
 
 }  // namespace cli

@@ -1,74 +1,132 @@
 // Films and cameras that OpenCV opens as sources of frames.
 
 #include <cmath>
-#include <opencv2/imgproc.hpp>
+#include <cstdlib>
 #include <opencv2/videoio.hpp>
 
 #include "base/error.h"
 #include "base/silence.h"
+#include "files/camera_formats.h"
 #include "files/image_file.h"
 #include "odometry/frames.h"
 #include "pair/session.h"
+#include "sources/film.h"
 
 namespace cli {
 namespace {
 
-cv::Mat luma_of(const cv::Mat& picture) {
-  cv::Mat luma;
-  if (picture.depth() != CV_8U) return luma;
-  switch (picture.channels()) {
-    case 1: return picture;
-    case 3: cv::cvtColor(picture, luma, cv::COLOR_BGR2GRAY); return luma;
-    case 4: cv::cvtColor(picture, luma, cv::COLOR_BGRA2GRAY); return luma;
-    default: return luma;
-  }
+// Whether the camera is of pictures of this size when they are shown with square pixels: players
+// keep the one side or the other.
+bool is_shown_size(const tv_camera& camera, int width, int height, double pixel_aspect) {
+  const auto is_near = [&](double w, double h) {
+    return std::abs(camera.width - w) <= 1 && std::abs(camera.height - h) <= 1;
+  };
+  return pixel_aspect != 1 &&
+         (is_near(width * pixel_aspect, height) || is_near(width, height / pixel_aspect));
 }
 
-class Film : public FrameSource {
+class FilmSource : public FrameSource {
  public:
-  Film(const std::string& file, double fps) : file_(file), fps_(fps) {
-    cv::VideoCapture film;
-    {
-      const StderrSilence silence;  // FFmpeg prints messages
-      film.open(file);
-    }
-    if (!film.isOpened()) {
+  FilmSource(const std::string& file, double fps) : file_(file), fps_(fps) {
+    const StderrSilence silence;  // FFmpeg prints messages
+    try {
+      facts_ = Film(file, fps).facts();
+    } catch (const BadInput&) {
       const std::string picture = unread_picture_file(file);
-      if (!picture.empty()) throw BadInput(file + " " + picture);
-      throw BadInput("cannot read " + file + ": it is no film that OpenCV reads");
+      if (picture.empty()) throw;
+      throw BadInput(file + " " + picture);
     }
-    if (fps_ > 0) return;
-    fps_ = film.get(cv::CAP_PROP_FPS);
-    if (!(fps_ > 0 && fps_ < 1e5))
-      throw BadInput("--fps is required: " + file + " does not say its frames a second");
   }
 
   void run(const Wanted& wanted, const Consumer& consume, const std::atomic<bool>& stop) override {
-    cv::VideoCapture film(file_);
-    cv::Mat picture;
-    for (int index = 0; !stop && film.grab(); ++index) {
-      if (!wanted(index)) continue;
+    Film film(file_, fps_);
+    bool goes_on = true;
+    while (goes_on && !stop && film.next()) {
       SourceFrame frame;
-      frame.index = index;
+      frame.index = static_cast<int>(film.index());
+      if (!wanted(frame.index)) continue;
       char name[40];
-      std::snprintf(name, sizeof name, "frame_%06d.png", index);
+      std::snprintf(name, sizeof name, "frame_%06d.png", frame.index);
       frame.name = name;
-      frame.time_s = index / fps_;
-      if (film.retrieve(picture)) frame.luma = luma_of(picture);
+      frame.time_s = film.time_s();
+      frame.luma = turned(film.luma());
       if (frame.luma.empty())
         frame.problem = "frame " + frame.name + " of " + file_ + " does not decode";
-      if (!consume(frame)) return;
+      goes_on = consume(frame);
     }
+    if (film.index() <= last_index_) return;  // of a second run that ended sooner
+    last_index_ = film.index();
+    facts_ = film.facts();
+    film_notes_ = film.notes();
   }
   bool can_run_again() const override { return true; }
   int num_frames() const override { return -1; }  // what the file's header says may be wrong
   std::string kind() const override { return "a film"; }
   std::vector<std::string> files() const override { return {file_}; }
+  std::vector<std::string> notes() const override {
+    std::vector<std::string> notes = film_notes_;
+    if (facts_.turn_deg != 0 || facts_.is_mirrored) notes.push_back(turn_note());
+    if (facts_.pixel_aspect != 1) notes.push_back(aspect_note());
+    return notes;
+  }
+  std::optional<FilmFacts> film() const override { return facts_; }
+  double pixel_aspect() const override { return facts_.pixel_aspect; }
+  void fit(tv_camera& camera) override;
 
  private:
+  std::string turn_note() const;
+  std::string aspect_note() const;
+  cv::Mat turned(const cv::Mat& luma) const {
+    if (!is_turned_ || luma.empty()) return luma;
+    Picture picture;
+    picture.luma = picture.colour = luma;
+    turn(picture, -facts_.turn_deg / 90);
+    return picture.luma;
+  }
+
   std::string file_;
   double fps_;
+  FilmFacts facts_;
+  int64_t last_index_ = -1;
+  std::vector<std::string> film_notes_;
+  bool is_turned_ = false;        // the camera is of the pictures as a player turns them
+  bool camera_is_shown_ = false;  // the camera is of square pixels
 };
+
+// A camera belongs to the pictures as they are stored where it has their size. One of the size at
+// which a player shows them belongs to those: a quarter turn is done on the pictures, and a stretch
+// is undone on the camera.
+void FilmSource::fit(tv_camera& camera) {
+  const int width = facts_.width, height = facts_.height;
+  const bool can_turn = facts_.turn_deg % 180 != 0;
+  if (camera.width == width && camera.height == height) return;
+  if (can_turn && camera.width == height && camera.height == width) {
+    is_turned_ = true;
+  } else if (is_shown_size(camera, width, height, facts_.pixel_aspect)) {
+    camera_is_shown_ = true;
+    camera = resized(camera, width, height);
+  } else if (can_turn && is_shown_size(camera, height, width, 1 / facts_.pixel_aspect)) {
+    is_turned_ = camera_is_shown_ = true;
+    camera = resized(camera, height, width);
+  }
+}
+
+std::string FilmSource::turn_note() const {
+  if (is_turned_)
+    return "the pictures are turned by " + std::to_string(facts_.turn_deg) +
+           " degrees clockwise, as a player does: the camera is of that size";
+  return stored_words(facts_) + ": so is the map, and the camera must be of stored pictures";
+}
+
+std::string FilmSource::aspect_note() const {
+  char text[200];
+  std::snprintf(text, sizeof text, "the film's pixels are %.4g times as wide as high: %s",
+                facts_.pixel_aspect,
+                camera_is_shown_
+                    ? "the camera, of square pixels, was scaled to them"
+                    : "a camera file is taken as of these pixels, --focal-35mm as of square ones");
+  return text;
+}
 
 class Camera : public FrameSource {
  public:
@@ -103,7 +161,7 @@ class Camera : public FrameSource {
 }  // namespace
 
 std::unique_ptr<FrameSource> open_film(const std::string& file, double fps) {
-  return std::make_unique<Film>(file, fps);
+  return std::make_unique<FilmSource>(file, fps);
 }
 
 std::unique_ptr<FrameSource> open_camera(int number) { return std::make_unique<Camera>(number); }

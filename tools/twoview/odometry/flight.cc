@@ -78,6 +78,7 @@ Flight::Flight(FrameSource& source, const FlightOptions& options)
   const CameraFile file = load_camera_file(options.camera_file);
   file_camera_ = file.of("");
   if (!file.note().empty()) notes_.push_back(file.note());
+  source.fit(file_camera_);
 }
 
 Flight::~Flight() = default;
@@ -113,7 +114,8 @@ void Flight::start(const SourceFrame& first) {
   if (options_.camera) {
     file_camera_ = *options_.camera;
   } else if (options_.focal_35mm > 0) {
-    file_camera_ = film_camera(options_.focal_35mm, frame.luma.cols, frame.luma.rows);
+    file_camera_ =
+        film_camera(options_.focal_35mm, frame.luma.cols, frame.luma.rows, source_.pixel_aspect());
   } else if (options_.camera_file.empty()) {
     const auto camera = source_.camera(frame, frame.luma.cols, frame.luma.rows);
     if (!camera)
@@ -167,8 +169,9 @@ void Flight::track_frame(SourceFrame frame) {
     if (is_first) start(frame);
     prepare(frame);
   } catch (const BadInput& e) {
-    // A source whose first frame cannot be used is refused; a later one is a missing frame.
-    if (is_first) throw;
+    // A picture that does not decode is a missing frame, also the first one. Where the first
+    // picture does not fit the camera none will, and the source is refused.
+    if (is_first && !frame.luma.empty()) throw;
     if (num_unreadable_++ == 0) first_problem_ = e.what();
     record.unreadable = true;
     record.status = state_.status == TV_ODOMETRY_STARTING ? TV_ODOMETRY_STARTING : TV_ODOMETRY_LOST;

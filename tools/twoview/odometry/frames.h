@@ -12,6 +12,7 @@
 
 #include "base/matrix.h"
 #include "files/exif.h"
+#include "sources/film.h"
 #include "twoview/camera.h"
 
 namespace cli {
@@ -65,8 +66,16 @@ class FrameSource {
   // The pose of the camera in the frame of the vehicle that the source's truth describes (EuRoC's
   // T_BS), row-major 3 x 4; empty: the truth describes the camera.
   virtual std::optional<std::array<double, 12>> body_from_camera() const { return {}; }
-  // What the user must know of the source, a line without an end; empty where there is nothing.
-  virtual std::string note() const { return ""; }
+  // What the user must know of the source, as lines without an end. After run() what became known
+  // while the frames were read is among them.
+  virtual std::vector<std::string> notes() const { return {}; }
+  // What a film's container says; empty for other sources.
+  virtual std::optional<FilmFacts> film() const { return {}; }
+  // The width of a pixel over its height.
+  virtual double pixel_aspect() const { return 1; }
+  // Fits a given camera and the pictures to each other where they are known to differ: a film that
+  // a player turns or stretches.
+  virtual void fit(tv_camera& camera) { (void)camera; }
   // The files that the source reads, which no output may replace.
   virtual std::vector<std::string> files() const { return {}; }
 };
@@ -78,7 +87,7 @@ class FrameSource {
 std::unique_ptr<FrameSource> open_image_folder(const std::string& folder, double fps,
                                                bool with_imu);
 
-// A film of any format that OpenCV reads. fps 0: the film's own rate.
+// A film of any format that OpenCV reads. fps 0: the film's own times.
 std::unique_ptr<FrameSource> open_film(const std::string& file, double fps);
 
 // The camera with this number on this computer.

@@ -9,6 +9,7 @@
 #include "files/camera_file.h"
 #include "files/camera_formats.h"
 #include "files/camera_set.h"
+#include "files/folder.h"
 #include "files/image_file.h"
 #include "files/yaml_values.h"
 #include "odometry/frames.h"
@@ -23,7 +24,8 @@ constexpr size_t kMaxFileBytes = 1 << 28;
 
 struct Listed {
   double time_s;
-  std::string name;  // relative to the source's folder
+  std::string name;     // relative to the source's folder
+  std::string problem;  // why it cannot be used; empty where nothing is known against it
 };
 
 bool is_file(const fs::path& path) {
@@ -46,7 +48,7 @@ struct Folder {
   std::optional<std::array<double, 12>> body_from_camera;
   std::optional<Measurements> measurements;
   std::vector<std::string> files;
-  std::string note;
+  std::vector<LeftOut> left_out;
 };
 
 class ImageFolder : public FrameSource {
@@ -62,15 +64,26 @@ class ImageFolder : public FrameSource {
       frame.name = listed.name;
       frame.time_s = listed.time_s;
       try {
-        const Picture picture = load_picture((fs::path(folder_.path) / listed.name).string());
+        if (!listed.problem.empty()) throw BadInput(listed.problem);
+        Picture picture = load_picture((fs::path(folder_.path) / listed.name).string());
+        if (picture.turn_deg != 0) turn_deg_ = picture.turn_deg;
+        if (is_turned_) turn(picture, -picture.turn_deg / 90);
         frame.luma = picture.luma;
         frame.exif = picture.exif;
+        has_stretched_ = has_stretched_ || picture.is_stretched;
       } catch (const BadInput& e) {
         frame.problem = e.what();
       }
       if (folder_.measurements) folder_.measurements->add_to(frame);
       if (!consume(frame)) return;
     }
+  }
+  // As for films: a camera of the turned size belongs to the turned pictures.
+  void fit(tv_camera& camera) override {
+    if (folder_.frames.empty()) return;
+    const cv::Size size = header_size((fs::path(folder_.path) / folder_.frames[0].name).string());
+    is_turned_ =
+        size.width != size.height && camera.width == size.height && camera.height == size.width;
   }
   bool can_run_again() const override { return true; }
   int num_frames() const override { return static_cast<int>(folder_.frames.size()); }
@@ -92,10 +105,23 @@ class ImageFolder : public FrameSource {
     return folder_.body_from_camera;
   }
   std::vector<std::string> files() const override { return folder_.files; }
-  std::string note() const override { return folder_.note; }
+  std::vector<std::string> notes() const override {
+    std::vector<std::string> notes;
+    if (!folder_.left_out.empty()) notes.push_back(left_out_words(folder_.left_out, folder_.path));
+    if (has_stretched_) notes.push_back(kStretchedNote);
+    if (turn_deg_ != 0)
+      notes.push_back(is_turned_
+                          ? "the pictures are turned as a viewer does (EXIF): the camera is of "
+                            "that size"
+                          : stored_words(turn_deg_) + " (EXIF): so is the map");
+    return notes;
+  }
 
  private:
   Folder folder_;
+  bool has_stretched_ = false;
+  int turn_deg_ = 0;        // of a picture, by EXIF
+  bool is_turned_ = false;  // the camera is of the pictures as a viewer turns them
 };
 
 // Reads lines `time name` and checks that the times rise; `scale` makes them seconds. The name is
@@ -203,45 +229,35 @@ void add_kitti_camera(Folder& folder) {
   throw BadInput(path + ": no line P0");
 }
 
-using Endings = std::vector<std::string>;
-const Endings kImages = {".jpg", ".jpeg", ".png", ".bmp", ".pgm", ".ppm", ".tif", ".tiff", ".webp"};
-const Endings kUnreadImages = {".heic", ".heif", ".avif", ".gif"};
-
-bool ends_as(const fs::path& path, const Endings& endings) {
-  std::string ending = path.extension().string();
-  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return std::find(endings.begin(), endings.end(), ending) != endings.end();
-}
-
-// The names of a folder's images with one of these endings in the order of their bytes.
-std::vector<std::string> image_names(const fs::path& folder, const Endings& endings = kImages) {
-  std::vector<std::string> names;
-  std::error_code error;
-  for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error))
-    if (ends_as(at->path(), endings) && is_file(at->path()))
-      names.push_back(at->path().filename().string());
-  if (error) throw BadInput("cannot read folder " + folder.string() + ": " + error.message());
-  std::sort(names.begin(), names.end());
-  return names;
-}
-
-// Which pictures of a folder are of formats that are not read; empty if there are none.
-std::string unread_images(const fs::path& folder) {
-  std::vector<std::string> lines;
-  for (const std::string& name : image_names(folder, kUnreadImages)) {
-    const std::string what = unread_picture_file((folder / name).string());
-    if (!what.empty()) lines.push_back(name + " " + what);
+// Leaves out what is not of the size that most pictures have, by their headers. A frame that a list
+// names stays, as one that cannot be used, since it has a time.
+void leave_out_other_sizes(Folder& folder, bool are_listed) {
+  std::vector<cv::Size> sizes;
+  for (const Listed& listed : folder.frames)
+    sizes.push_back(header_size((fs::path(folder.path) / listed.name).string()));
+  const cv::Size usual = most_frequent(sizes);
+  std::vector<Listed> kept;
+  for (size_t k = 0; k < sizes.size(); ++k) {
+    Listed& listed = folder.frames[k];
+    if (sizes[k].area() > 0 && sizes[k] != usual) {
+      const std::string why = other_size_words(sizes[k], usual);
+      if (are_listed)
+        listed.problem = "frame " + listed.name + " " + why;
+      else
+        folder.left_out.push_back({listed.name, why});
+      if (!are_listed) continue;
+    }
+    kept.push_back(std::move(listed));
   }
-  if (lines.empty()) return "";
-  if (lines.size() == 1) return "1 picture of " + folder.string() + " is left out: " + lines[0];
-  return std::to_string(lines.size()) + " pictures of " + folder.string() +
-         " are left out, the first: " + lines[0];
+  folder.frames = std::move(kept);
 }
 
 void read_kitti(Folder& folder) {
   const fs::path path = folder.path;
   const std::string times = (path / "times.txt").string();
-  const std::vector<std::string> names = image_names(path / "image_0");
+  FolderPictures pictures = pictures_of(path / "image_0");
+  const std::vector<std::string>& names = pictures.names;
+  folder.left_out = std::move(pictures.left_out);
   if (names.empty()) throw BadInput((path / "image_0").string() + ": no image in it");
   const std::string text = read_file(times, kMaxFileBytes);
   const std::vector<TextLine> lines = lines_of(text);
@@ -249,7 +265,7 @@ void read_kitti(Folder& folder) {
     throw BadInput(times + " has " + std::to_string(lines.size()) + " times, but image_0 has " +
                    std::to_string(names.size()) + " images");
   for (size_t k = 0; k < names.size(); ++k) {
-    Listed listed{0, "image_0/" + names[k]};
+    Listed listed{0, "image_0/" + names[k], ""};
     const std::string where = times + ": line " + std::to_string(lines[k].number);
     if (!to_number(lines[k].text, listed.time_s)) throw BadInput(where + " is not a time");
     if (k > 0 && !(listed.time_s > folder.frames.back().time_s))
@@ -312,22 +328,29 @@ std::unique_ptr<FrameSource> open_image_folder(const std::string& path, double f
     folder.kind = "a KITTI folder (image_0, times.txt)";
     refuse_fps(fps, folder);
     read_kitti(folder);
+    leave_out_other_sizes(folder, true);
     return std::make_unique<KittiFolder>(std::move(folder));
   } else {
     folder.kind = "a folder of images";
-    const std::vector<std::string> names = image_names(root);
-    folder.note = unread_images(root);
-    if (names.empty() && !folder.note.empty())
-      throw BadInput(path + " holds no image that is read: " + folder.note);
+    FolderPictures pictures = pictures_of(root);
+    const std::vector<std::string>& names = pictures.names;
+    folder.left_out = std::move(pictures.left_out);
+    if (names.empty() && !folder.left_out.empty())
+      throw BadInput(path +
+                     " holds no image that is read: " + left_out_words(folder.left_out, path));
     if (names.empty())
       throw BadInput(path +
                      " holds neither frames.txt, rgb.txt, mav0/cam0/data.csv, image_0, video.pave "
                      "nor any image");
     if (!(fps > 0)) throw BadInput("--fps is required: " + path + " holds images without times");
-    for (size_t k = 0; k < names.size(); ++k)
-      folder.frames.push_back({static_cast<double>(k) / fps, names[k]});
+    for (const std::string& name : names) folder.frames.push_back({0, name, ""});
+    leave_out_other_sizes(folder, false);
+    for (size_t k = 0; k < folder.frames.size(); ++k)
+      folder.frames[k].time_s = static_cast<double>(k) / fps;
     add_cameras(folder);
+    return std::make_unique<ImageFolder>(std::move(folder));
   }
+  leave_out_other_sizes(folder, true);
   return std::make_unique<ImageFolder>(std::move(folder));
 }
 

@@ -186,6 +186,10 @@ int map_export(const std::string& path, const std::string& output) {
   const LoadedMap map({path});
   OutputSet files(output);
   files.keep(path);
+  files.require_own({"map export",
+                     {"cloud.ply", "keyframes.txt", "covariances.txt"},
+                     {"cloud.ply", "keyframes.txt"},
+                     {"frames.csv"}});
   FlightResult result;
   result.keyframes = map.keyframes_with_covariances();
   files.add("cloud.ply", map_ply(cloud_points(map.points(), result.keyframes)));

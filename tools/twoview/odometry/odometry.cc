@@ -41,6 +41,7 @@ const char* const kEstimatedFile = "estimated_camera.yaml";
 const std::vector<std::string> kFiles = {
     "trajectory.txt", "live.txt",  "keyframes.txt", kCameraFile,   "covariances.txt", kStillFile,
     "frames.csv",     "cloud.ply", "map.twm",       "report.html", "result.json",     kEstimatedFile};
+const std::vector<std::string> kAlwaysFiles = {"frames.csv", "live.txt", "result.json"};
 const std::vector<std::string> kColmapFiles = {"cameras.txt", "images.txt", "points3D.txt"};
 
 struct Arguments {
@@ -168,12 +169,12 @@ int num_wanted(const FrameSource& source, const FlightOptions& options) {
 }
 
 // Says that frames above the size that reconstruct takes as it is are tracked as they are.
-void advise_on_size(const Arguments& a, const tv_camera& camera) {
+void advise_on_size(Arguments& a, const tv_camera& camera) {
   if (a.has_resize || std::max(camera.width, camera.height) <= kLargeSide) return;
-  std::fprintf(stderr,
-               "twoview: note: frames above %d pixels a side are used as they are: %dx%d; "
-               "--resize %d is advised\n",
-               kLargeSide, camera.width, camera.height, kUsualSide);
+  a.common.note("frames above " + std::to_string(kLargeSide) +
+                " pixels a side are used as they are: " + std::to_string(camera.width) + "x" +
+                std::to_string(camera.height) + "; --resize " + std::to_string(kUsualSide) +
+                " is advised");
 }
 
 nlohmann::ordered_json options_of(const Arguments& a, const std::string& truth_file) {
@@ -199,6 +200,15 @@ nlohmann::ordered_json options_of(const Arguments& a, const std::string& truth_f
   if (a.flight.focal_35mm > 0) json["focal_35mm"] = a.flight.focal_35mm;
   json["truth"] = text_or_null(truth_file);
   return json;
+}
+
+nlohmann::ordered_json film_json(const std::optional<FilmFacts>& film) {
+  if (!film) return nullptr;
+  return {{"times", times_name(film->times)},   {"rate_hz", film->rate_hz},
+          {"variable_rate", film->is_variable}, {"clock_start_s", film->clock_start_s},
+          {"num_left_out", film->num_left_out}, {"size", {film->width, film->height}},
+          {"rotation_deg", film->turn_deg},     {"mirrored", film->is_mirrored},
+          {"pixel_aspect", film->pixel_aspect}};
 }
 
 // The camera that was estimated, as a file for the next flight. One that is doubtful is not
@@ -241,7 +251,10 @@ void make_colmap_files(const FlightResult& result, OutputSet& files) {
 
 std::string truth_line(const nlohmann::ordered_json& truth) {
   if (!truth["ate_rmse"].is_number())
-    return summary_line("truth", "%s", "fewer than three of its poses have a time of the path");
+    return summary_line("truth", "%s",
+                        truth["num_compared"].get<int>() < 3
+                            ? "fewer than three of its poses have a time of the path"
+                            : "the true path has no length, so there is nothing to compare with");
   std::string text = summary_line(
       "truth", "position off by %.4g (rms after the best similarity), %.2f %% of the path of %.4g",
       truth["ate_rmse"].get<double>(), truth["ate_rmse_percent_of_path"].get<double>(),
@@ -276,10 +289,12 @@ std::string still_note(const FlightResult& result) {
 }
 
 std::string summary(const FlightResult& result, const std::optional<FilmLens>& lens,
-                    const FrameSource& source, const OutputSet& files, bool has_colmap) {
+                    const FrameSource& source, const OutputSet& files, bool has_colmap,
+                    const std::string& notes) {
   const nlohmann::ordered_json& j = result.json;
   std::string text =
       summary_line("source", "%s, %d frames", source.kind().c_str(), j["num_frames"].get<int>());
+  text += notes;
   if (lens) {
     text += summary_line("camera", "%s, estimated from the film", lens->words().c_str());
     if (lens->is_uncertain) {
@@ -338,7 +353,7 @@ std::string summary(const FlightResult& result, const std::optional<FilmLens>& l
 
 // The lens of a film of which neither the command line nor the source says a camera; empty where
 // one is known. Photographs' EXIF data say the focal length: it is put into the options.
-std::optional<FilmLens> lens_of_film(const Arguments& a, FrameSource& source,
+std::optional<FilmLens> lens_of_film(Arguments& a, FrameSource& source,
                                      const std::atomic<bool>& stop, FlightOptions* options) {
   if (!is_auto(a)) {
     if (!a.camera.empty() || options->focal_35mm > 0 || !source.can_run_again()) return {};
@@ -353,17 +368,18 @@ std::optional<FilmLens> lens_of_film(const Arguments& a, FrameSource& source,
     if (source.camera(first, first.luma.cols, first.luma.rows)) return {};
     if (first.exif.focal_35mm > 0) {
       options->focal_35mm = first.exif.focal_35mm;
-      std::fprintf(stderr,
-                   "twoview: note: focal length %.4g mm (35 mm equivalent) from EXIF; --camera is "
-                   "better\n",
-                   options->focal_35mm);
+      char text[96];
+      std::snprintf(text, sizeof text,
+                    "focal length %.4g mm (35 mm equivalent) from EXIF; --camera is better",
+                    options->focal_35mm);
+      a.common.note(text);
       return {};
     }
   }
   options->focal_35mm = 0;
-  std::fprintf(stderr,
-               "twoview: note: no camera is given: the focal length is estimated from the film, "
-               "which takes up to four times as long\n");
+  a.common.note(
+      "no camera is given: the focal length is estimated from the film, which takes up to four "
+      "times as long");
   const Progress line(!a.common.quiet);
   const FilmLens lens = estimate_film_lens(source, *options, stop,
                                            [&line](const std::string& words) { line.tell(words); });
@@ -390,7 +406,7 @@ int odometry(Arguments& a) {
     throw BadInput("--focal-35mm is for films and photographs without a camera file");
   const std::unique_ptr<FrameSource> source = open_source(a);
   const std::string truth_file = a.truth.empty() ? source->truth_file() : a.truth;
-  std::optional<Trajectory> truth;
+  std::optional<TruePoses> truth;
   if (!truth_file.empty())
     truth = load_trajectory(truth_file, source->times(), source->body_from_camera());
   Session session(common.options);  // says which kernels are used
@@ -400,7 +416,9 @@ int odometry(Arguments& a) {
   for (const std::string& name : source->files()) files.keep(name);
   files.keep(camera_path(a.camera));
   files.keep(truth_file);
-  if (!source->note().empty()) std::fprintf(stderr, "twoview: note: %s\n", source->note().c_str());
+  std::vector<std::string> names = kFiles;
+  for (const std::string& name : kColmapFiles) names.push_back("colmap/" + name);
+  files.require_own({"odometry", names, kAlwaysFiles, {}});
   const int wanted = num_wanted(*source, a.flight);
   FlightOptions options = a.flight;
   const std::optional<FilmLens> lens = lens_of_film(a, *source, stop, &options);
@@ -417,19 +435,33 @@ int odometry(Arguments& a) {
   {
     FlightProgress progress(flight, wanted, !common.quiet);
     flight.track(stop, [&] {
-      if (flight.frames().size() == 1) advise_on_size(a, flight.file_camera());
+      advise_on_size(a, flight.file_camera());
       progress.show();
       if (live) live->update(flight);
     });
   }
   if (flight.frames().empty()) throw BadInput("no frame came from " + source->kind());
+  if (flight.num_unreadable() == static_cast<int>(flight.frames().size()))
+    throw BadInput("no frame of " + source->kind() +
+                   " could be used, the first: " + flight.first_problem());
+  {
+    const Stopwatch watch(!common.quiet, "looking in the finished map for frames without a pose");
+    flight.finish(stop);
+  }
   for (const std::string& note : flight.notes()) common.note(note);
   for (const std::string& mask : flight.mask_files()) files.keep(mask);
-  flight.finish(stop);
-  FlightResult result =
-      result_of(flight, truth, wanted < 0 ? static_cast<int>(flight.frames().size()) : wanted);
+  for (const std::string& note : source->notes()) common.note(note);
+  if (const int count = flight.num_unreadable(); count > 0)
+    common.note(std::to_string(count) + (count == 1 ? " frame" : " frames") +
+                " could not be used, the first: " + flight.first_problem());
+  const std::optional<FilmFacts> film = source->film();
+  FlightResult result = result_of(flight, truth, film ? film->clock_start_s : 0,
+                                  wanted < 0 ? static_cast<int>(flight.frames().size()) : wanted);
+  if (!result.truth_note.empty()) common.note(result.truth_note);
   if (!flight.still_mask().empty()) common.note(still_note(result));
   result.json["focal_length"] = lens ? lens->json() : nlohmann::ordered_json(nullptr);
+  result.json["film"] = film_json(film);
+  result.json["notes"] = common.notes;
   result.json["interrupted"] = stop.load();
   result.json["source"] = a.source.empty() ? source->kind() : a.source;
   result.json["options"] = options_of(a, truth_file);
@@ -448,7 +480,7 @@ int odometry(Arguments& a) {
   }
   if (common.json) print(json_text(result.json));
   const std::string notes = common.note_lines();
-  if (common.speaks()) print(notes + summary(result, lens, *source, files, has_map));
+  if (common.speaks()) print(summary(result, lens, *source, files, has_map, notes));
   files.commit();
   files.remove_others(kFiles);
   if (colmap) {
@@ -457,9 +489,6 @@ int odometry(Arguments& a) {
     std::error_code ignored;
     if (!has_map) fs::remove(colmap_folder, ignored);  // not where something else is in it
   }
-  if (flight.num_unreadable() > 0)
-    std::fprintf(stderr, "twoview: %d frames could not be used, the first: %s\n",
-                 flight.num_unreadable(), flight.first_problem().c_str());
   return exit_status(flight, result);
 }
 

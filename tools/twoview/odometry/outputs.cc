@@ -109,13 +109,13 @@ Json truth_json(const FlightResult& result, bool is_metric) {
           ? static_cast<double>(best.size()) / static_cast<double>(result.num_source_frames)
           : 0.0;
   json["num_compared"] = a.num_poses;
-  const bool known = a.num_poses >= 3;
+  const bool known = a.has_errors();
   const auto number = [](bool has, double value) {
     return has && std::isfinite(value) ? Json(value) : Json(nullptr);
   };
-  json["path_length"] = number(known, a.path_length);
+  json["path_length"] = number(a.num_poses >= 3, a.path_length);
   json["ate_rmse"] = number(known, a.ate_rmse);
-  json["ate_live_rmse"] = number(live.num_poses >= 3, live.ate_rmse);
+  json["ate_live_rmse"] = number(live.has_errors(), live.ate_rmse);
   json["ate_rmse_percent_of_path"] = number(known, 100 * a.ate_rmse / a.path_length);
   json["ate_metric_rmse"] = number(known && is_metric, a.ate_rigid_rmse);
   json["rpe_rotation_deg"] = number(known, a.rpe_rotation_deg);
@@ -204,8 +204,8 @@ Trajectory live_trajectory_of(const Flight& flight, const LiveStretch& stretch) 
   return trajectory;
 }
 
-FlightResult result_of(const Flight& flight, const std::optional<Trajectory>& truth,
-                       int num_source_frames) {
+FlightResult result_of(const Flight& flight, const std::optional<TruePoses>& truth,
+                       double film_start_s, int num_source_frames) {
   FlightResult result;
   result.flight = &flight;
   result.num_source_frames = num_source_frames;
@@ -216,9 +216,13 @@ FlightResult result_of(const Flight& flight, const std::optional<Trajectory>& tr
   result.live_stretch = longest_stretch(flight);
   if (truth) {
     result.has_truth = true;
-    result.truth = *truth;
-    result.accuracy = accuracy_of(trajectory_of(flight, result.segment), *truth);
-    result.live_accuracy = accuracy_of(live_trajectory_of(flight, result.live_stretch), *truth);
+    TruePoses fitted = *truth;
+    const Trajectory path = trajectory_of(flight, result.segment);
+    result.truth_note = fit_times(path, fitted, film_start_s);
+    result.truth = fitted.poses;
+    result.accuracy = accuracy_of(path, result.truth);
+    result.live_accuracy =
+        accuracy_of(live_trajectory_of(flight, result.live_stretch), result.truth);
   }
   result.json = flight_json(result);
   return result;

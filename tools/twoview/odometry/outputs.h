@@ -31,13 +31,15 @@ struct FlightResult {
   LiveStretch live_stretch;
   bool has_truth = false;
   Trajectory truth;
+  std::string truth_note;            // on its times; empty where there is nothing to say
   Accuracy accuracy, live_accuracy;  // of the segment, and of that stretch
   nlohmann::ordered_json json;
 };
 
 // Collects the map, chooses the segments, and compares them with the truth.
-FlightResult result_of(const Flight& flight, const std::optional<Trajectory>& truth,
-                       int num_source_frames);
+// film_start_s: what a film's own clock says at time 0, which the truth's times may be of.
+FlightResult result_of(const Flight& flight, const std::optional<TruePoses>& truth,
+                       double film_start_s, int num_source_frames);
 
 // The frames of one segment with their final poses, and those of a stretch as they were known when
 // tracked.

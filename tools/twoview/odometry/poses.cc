@@ -1,6 +1,7 @@
 #include "odometry/poses.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <cstdio>
 
@@ -12,7 +13,10 @@ namespace cli {
 namespace {
 
 constexpr size_t kMaxFileBytes = 1 << 28;
-constexpr size_t kTum = 8, kKitti = 12, kEuroc = 8;
+constexpr size_t kTum = 8, kKitti = 12, kKitti4x4 = 16;
+constexpr const char* kSeparators = ",;";
+constexpr double kUnitError = 0.1;       // by how much a quaternion's length may differ from 1
+constexpr double kRotationError = 0.01;  // the same of the entries of R R^T
 
 [[noreturn]] void refuse_line(const std::string& file, int line, const std::string& why) {
   throw BadInput(file + ": line " + std::to_string(line) + " " + why);
@@ -28,15 +32,133 @@ Matrix3 orthonormal(const Matrix3& m) {
   return rotation_of_quaternion(q[0], q[1], q[2], q[3]);
 }
 
+double rotation_error(const Matrix3& m) {
+  const Matrix3 square = product(m, transposed(m));
+  double most = 0;
+  for (size_t i = 0; i < 9; ++i) most = std::max(most, std::abs(square[i] - (i % 4 == 0 ? 1 : 0)));
+  return most;
+}
+
 std::vector<double> numbers_in(const std::string& file, const TextLine& line) {
   std::vector<double> numbers;
-  for (const std::string_view word : words_of(line.text, ",")) {
+  for (const std::string_view word : words_of(line.text, kSeparators)) {
     double value = 0;
     if (!to_number(word, value))
       refuse_line(file, line.number, "has '" + std::string(word) + "', which is no finite number");
     numbers.push_back(value);
   }
   return numbers;
+}
+
+// How the numbers of a line make a pose.
+struct Layout {
+  size_t count = 0;  // numbers of a line
+  bool is_matrix = false, is_body = false;
+  double unit_s = 1;
+  std::array<size_t, 8> at{0, 1, 2, 3, 4, 5, 6, 7};  // of time, x y z, qx qy qz qw
+};
+
+const std::array<std::vector<std::string>, 8> kNames = {{
+    {"timestamp", "time", "t", "stamp", "sec", "secs", "seconds"},
+    {"tx", "x", "px", "p_x", "pos_x", "position_x", "p_rs_r_x"},
+    {"ty", "y", "py", "p_y", "pos_y", "position_y", "p_rs_r_y"},
+    {"tz", "z", "pz", "p_z", "pos_z", "position_z", "p_rs_r_z"},
+    {"qx", "q_x", "quat_x", "rot_x", "orientation_x", "q_rs_x"},
+    {"qy", "q_y", "quat_y", "rot_y", "orientation_y", "q_rs_y"},
+    {"qz", "q_z", "quat_z", "rot_z", "orientation_z", "q_rs_z"},
+    {"qw", "q_w", "quat_w", "rot_w", "orientation_w", "q_rs_w"},
+}};
+struct Unit {
+  const char* name;
+  double seconds;
+};
+constexpr Unit kUnits[] = {{"s", 1}, {"ms", 1e-3}, {"us", 1e-6}, {"ns", 1e-9}};
+
+// A column's name in small letters, without its unit in brackets or behind "_", which goes to
+// `unit`.
+std::string plain_name(std::string_view word, std::string& unit) {
+  std::string name;
+  for (const char c : word)
+    if (c != '"' && c != '#' && c != '\'')
+      name += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  unit.clear();
+  if (const size_t open = name.find_first_of("[("); open != name.npos) {
+    unit = name.substr(open + 1, name.find_first_of("])", open) - open - 1);
+    name.resize(open);
+  }
+  while (!name.empty() && (name.back() == ' ' || name.back() == '_')) name.pop_back();
+  while (!name.empty() && name.front() == ' ') name.erase(0, 1);
+  for (const Unit& known : kUnits) {
+    const std::string tail = std::string("_") + known.name;
+    if (name.size() <= tail.size() || name.substr(name.size() - tail.size()) != tail) continue;
+    unit = known.name;
+    name.resize(name.size() - tail.size());
+    break;
+  }
+  return name;
+}
+
+// The layout by a line of names.
+Layout layout_of_names(const std::string& file, const TextLine& line) {
+  std::vector<std::string> words;
+  const bool has_separators = line.text.find_first_of(kSeparators) != std::string_view::npos;
+  std::string_view rest = line.text;
+  if (has_separators) {  // a name may hold blanks
+    for (size_t end = 0; end != rest.npos; rest.remove_prefix(std::min(end + 1, rest.size()))) {
+      end = rest.find_first_of(kSeparators);
+      words.emplace_back(rest.substr(0, end));
+      if (end == rest.npos) break;
+    }
+  } else {
+    for (const std::string_view word : words_of(rest)) words.emplace_back(word);
+  }
+  Layout layout;
+  layout.count = words.size();
+  std::array<bool, 8> found{};
+  for (size_t k = 0; k < words.size(); ++k) {
+    std::string unit;
+    const std::string name = plain_name(words[k], unit);
+    for (size_t column = 0; column < 8; ++column) {
+      const auto& names = kNames[column];
+      if (found[column] || std::find(names.begin(), names.end(), name) == names.end()) continue;
+      found[column] = true;
+      layout.at[column] = k;
+      if (column > 0) continue;
+      for (const Unit& known : kUnits)
+        if (unit == known.name) layout.unit_s = known.seconds;
+    }
+  }
+  for (size_t column = 0; column < 8; ++column)
+    if (!found[column])
+      refuse_line(file, line.number,
+                  "names columns, but none is " + kNames[column][0] + ": " +
+                      std::string(line.text.substr(0, 80)));
+  return layout;
+}
+
+bool is_whole(std::string_view word) { return word.find_first_of(".eE") == word.npos; }
+
+// The layout by the first line of numbers.
+Layout layout_of_numbers(const std::string& file, const TextLine& line) {
+  const std::vector<std::string_view> words = words_of(line.text, kSeparators);
+  const bool has_separators = line.text.find_first_of(kSeparators) != std::string_view::npos;
+  Layout layout;
+  layout.count = words.size();
+  if (!has_separators && (layout.count == kKitti || layout.count == kKitti4x4)) {
+    layout.is_matrix = true;
+    layout.unit_s = 0;
+  } else if (has_separators &&
+             (layout.count > kTum || (layout.count == kTum && is_whole(words[0])))) {
+    layout.is_body = true;
+    layout.at = {0, 1, 2, 3, 5, 6, 7, 4};
+    layout.unit_s = is_whole(words[0]) ? 1e-9 : 1;
+  } else if (layout.count != kTum) {
+    refuse_line(file, line.number,
+                "has " + std::to_string(layout.count) +
+                    " numbers: neither TUM's 8 (timestamp tx ty tz qx qy qz qw), EuRoC's with "
+                    "commas, nor KITTI's 12; angles in place of a quaternion are not read");
+  }
+  return layout;
 }
 
 }  // namespace
@@ -91,49 +213,56 @@ std::string tum_line(double time_s, const Pose& pose) {
   return line;
 }
 
-Trajectory load_trajectory(const std::string& file, const std::vector<double>& frame_times,
-                           const std::optional<std::array<double, 12>>& body_from_camera) {
+TruePoses load_trajectory(const std::string& file, const std::vector<double>& frame_times,
+                          const std::optional<std::array<double, 12>>& body_from_camera) {
   const std::string text = read_file(file, kMaxFileBytes);
-  const std::vector<TextLine> lines = lines_of(text);
+  std::vector<TextLine> lines = lines_of(text);
   if (lines.empty()) throw BadInput(file + ": no pose in it");
-  const bool is_euroc = lines[0].text.find(',') != std::string_view::npos;
-  const size_t count = words_of(lines[0].text, ",").size();
-  const bool is_kitti = !is_euroc && count == kKitti;
-  const bool fits = is_euroc ? count >= kEuroc : is_kitti || count == kTum;
-  if (!fits)
-    refuse_line(file, lines[0].number,
-                "has " + std::to_string(count) +
-                    " numbers: neither TUM's 8, EuRoC's with commas, nor KITTI's 12");
-  if (is_kitti && frame_times.empty())
+  double ignored = 0;
+  const bool has_names = !to_number(words_of(lines[0].text, kSeparators)[0], ignored) &&
+                         std::isdigit(static_cast<unsigned char>(lines[0].text[0])) == 0;
+  const Layout layout =
+      has_names ? layout_of_names(file, lines[0]) : layout_of_numbers(file, lines[0]);
+  if (has_names) lines.erase(lines.begin());
+  if (lines.empty()) throw BadInput(file + ": no pose in it");
+  if (layout.is_matrix && frame_times.empty())
     throw BadInput(file + " has KITTI's poses without times, and the frames' times are not known");
-  Trajectory trajectory;
+  TruePoses truth;
+  truth.unit_s = layout.unit_s;
   for (const TextLine& line : lines) {
     const std::vector<double> n = numbers_in(file, line);
-    if (n.size() != count)
-      refuse_line(file, line.number,
-                  "has " + std::to_string(n.size()) + " numbers, not " + std::to_string(count));
+    if (n.size() != layout.count)
+      refuse_line(
+          file, line.number,
+          "has " + std::to_string(n.size()) + " numbers, not " + std::to_string(layout.count));
     TimedPose at;
-    if (is_kitti) {
-      const size_t idx = trajectory.size();
+    if (layout.is_matrix) {
+      const size_t idx = truth.poses.size();
       if (idx >= frame_times.size()) break;  // the poses of frames beyond those that are here
       at = {frame_times[idx], pose_of_12(n.data())};
+      if (rotation_error(at.pose.R) > kRotationError)
+        refuse_line(file, line.number, "has a matrix that is no rotation");
       at.pose.R = orthonormal(at.pose.R);
     } else {
-      const double* q = &n[4];
-      if (!(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3] > 1e-12))
-        refuse_line(file, line.number, "has a quaternion of length 0");
-      at.time_s = is_euroc ? n[0] * 1e-9 : n[0];
-      at.pose.t = {n[1], n[2], n[3]};
-      at.pose.R = is_euroc ? rotation_of_quaternion(q[1], q[2], q[3], q[0])
-                           : rotation_of_quaternion(q[0], q[1], q[2], q[3]);
-      if (is_euroc && body_from_camera)
+      const auto value = [&](size_t column) { return n[layout.at[column]]; };
+      const double length = std::sqrt(value(4) * value(4) + value(5) * value(5) +
+                                      value(6) * value(6) + value(7) * value(7));
+      if (!(length > 1e-6)) refuse_line(file, line.number, "has a quaternion of length 0");
+      if (std::abs(length - 1) > kUnitError)
+        refuse_line(file, line.number,
+                    "has a quaternion of length " + std::to_string(length) +
+                        ", not 1: is it another quantity?");
+      at.time_s = value(0) * layout.unit_s;
+      at.pose.t = {value(1), value(2), value(3)};
+      at.pose.R = rotation_of_quaternion(value(4), value(5), value(6), value(7));
+      if (layout.is_body && body_from_camera)
         at.pose = composed(at.pose, pose_of_12(body_from_camera->data()));
     }
-    if (!trajectory.empty() && !(at.time_s > trajectory.back().time_s))
+    if (!truth.poses.empty() && !(at.time_s > truth.poses.back().time_s))
       refuse_line(file, line.number, "has a time that is not later than that of the line before");
-    trajectory.push_back(at);
+    truth.poses.push_back(at);
   }
-  return trajectory;
+  return truth;
 }
 
 }  // namespace cli

@@ -72,7 +72,7 @@ Json paths_json(const FlightResult& result, const View& view) {
   }
   end();
   const Accuracy& a = result.accuracy;
-  if (a.num_poses < 3) return paths;
+  if (!a.has_errors()) return paths;
   // The truth in the map's frame: the inverse of the similarity.
   for (const Association& pair : a.pairs) {
     Vector3 d = result.truth[pair.idx_truth].pose.t;
@@ -156,7 +156,7 @@ Json frames_json(const FlightResult& result) {
   }
   Json json = {{"time", time}, {"status", status},   {"inliers", inliers},
                {"ms", ms},     {"reasons", reasons}, {"key", key}};
-  if (result.accuracy.num_poses < 3) return json;
+  if (!result.accuracy.has_errors()) return json;
   std::map<double, size_t> index;
   for (size_t i = 0; i < frames.size(); ++i) index[frames[i].time_s] = i;
   const Trajectory path = trajectory_of(*result.flight, result.segment);
@@ -261,7 +261,7 @@ std::string cloud_section(const FlightResult& result) {
   if (result.points.empty()) return "";
   const bool is_metric = result.json["scale"] == "metric";
   const std::string truth =
-      result.accuracy.num_poses >= 3 ? ", the truth green, brought to the map by a similarity" : "";
+      result.accuracy.has_errors() ? ", the truth green, brought to the map by a similarity" : "";
   const std::string others = result.json["num_segments"].get<int>() > 1
                                  ? " Only the longest segment is shown: segments do not compare."
                                  : "";
@@ -344,6 +344,7 @@ std::string flight_report(const FlightResult& result, const std::string& name) {
                               {"verdict_class", head.style},
                               {"verdict", head.word},
                               {"verdict_words", escaped(head.words)},
+                              {"notes", bullets("notes", result.json["notes"])},
                               {"cards", cards(result)},
                               {"cloud", cloud_section(result)},
                               {"keyframes", keyframes_section(data["keyframes"])},

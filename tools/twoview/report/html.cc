@@ -46,6 +46,12 @@ std::string card(const std::string& number, const std::string& unit, const std::
          (unit.empty() ? "" : "<i>" + unit + "</i>") + "</b><span>" + what + "</span></div>\n";
 }
 
+std::string bullets(const std::string& css_class, const std::vector<std::string>& texts) {
+  std::string items;
+  for (const std::string& text : texts) items += "<li>" + escaped(text) + "</li>\n";
+  return items.empty() ? "" : "<ul class=\"" + css_class + "\">\n" + items + "</ul>\n";
+}
+
 std::string base64(const std::string& bytes) {
   static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::string text;

@@ -21,6 +21,9 @@ std::string filled(const std::string& page,
 std::string card(const std::string& number, const std::string& unit, const std::string& what,
                  const char* classes = "card");
 
+// A list with a line of each text; nothing without texts.
+std::string bullets(const std::string& css_class, const std::vector<std::string>& texts);
+
 // Encodes bytes as Base64 (RFC 4648) with padding.
 std::string base64(const std::string& bytes);
 

@@ -92,13 +92,6 @@ std::string cards(const Outcome& outcome) {
   return text;
 }
 
-// A list with a line of each text; nothing without texts.
-std::string bullets(const std::string& css_class, const std::vector<std::string>& texts) {
-  std::string items;
-  for (const std::string& text : texts) items += "<li>" + escaped(text) + "</li>\n";
-  return items.empty() ? "" : "<ul class=\"" + css_class + "\">\n" + items + "</ul>\n";
-}
-
 std::string leaf_text(const Json& value) {
   if (value.is_null()) return "&ndash;";
   if (value.is_string()) return escaped(value.get<std::string>());

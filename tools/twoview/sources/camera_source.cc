@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <mutex>
 #include <opencv2/core/utils/logger.hpp>
 #include <opencv2/imgproc.hpp>
@@ -13,6 +15,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "sources/film.h"
 
 namespace cli {
 namespace {
@@ -69,6 +72,7 @@ struct CameraSource::State {
   tvs_status next(tvs_frame* frame);
 
   const Kind kind;
+  std::unique_ptr<Film> film_file;  // of a file that is not live; else `capture`
   cv::VideoCapture capture;
   cv::Mat colour;
   uint64_t num_taken = 0, next_number = 0;
@@ -84,7 +88,12 @@ struct CameraSource::State {
 // Waits for the next picture of the file or camera. Returns false at the end.
 bool CameraSource::State::take(Shot& shot) {
   try {
-    if (!capture.read(colour) || colour.empty()) return false;
+    if (film_file ? !film_file->next() : !capture.grab()) return false;
+    if (film_file)
+      colour = film_file->picture();
+    else
+      capture.retrieve(colour);
+    if (colour.empty()) return false;
     shot.luma = cv::Mat();
     if (colour.channels() == 1)
       shot.luma = colour.clone();
@@ -99,18 +108,18 @@ bool CameraSource::State::take(Shot& shot) {
   if (kind == Kind::kLive) {
     shot.time.received_ns = shot.time.host_ns = steady_ns();
     shot.time.uncertainty_ns = INT64_MAX;
-  } else if (kind == Kind::kPaced) {
+    return true;
+  }
+  double seconds = 0;
+  if (film_file) {
+    seconds = film_file->time_s();
+  } else {  // what OpenCV plays that is no file, such as numbered pictures
     const double fps = capture.get(cv::CAP_PROP_FPS);
-    const double seconds = static_cast<double>(shot.number) / (fps > 0 && fps < 1e4 ? fps : 30);
-    shot.time.received_ns = shot.time.host_ns = start_ns + static_cast<int64_t>(seconds * 1e9);
-  } else {
-    // The time is the frame number divided by the frame rate, because OpenCV's position is that of
-    // this picture in one backend and of the next one in another.
-    const double fps = capture.get(cv::CAP_PROP_FPS);
-    const double seconds = fps > 0 ? static_cast<double>(shot.number) / fps
-                                   : capture.get(cv::CAP_PROP_POS_MSEC) * 1e-3;
-    shot.time.received_ns = shot.time.host_ns = shot.time.device_ns =
-        static_cast<int64_t>(seconds * 1e9);
+    seconds = static_cast<double>(shot.number) / (fps > 0 && fps < 1e4 ? fps : 30);
+  }
+  shot.time.received_ns = shot.time.host_ns = start_ns + std::llround(seconds * 1e9);
+  if (kind == Kind::kFile) {
+    shot.time.device_ns = shot.time.host_ns;
     shot.time.clock_id = 1;
   }
   return true;
@@ -173,7 +182,13 @@ CameraSource::CameraSource(const std::string& name, Kind kind)
   bool is_open = false;
   const Silence silence;
   try {
-    is_open = open_capture(state_->capture, name);
+    std::error_code error;
+    if (kind != Kind::kLive && std::filesystem::is_regular_file(name, error)) {
+      state_->film_file = std::make_unique<Film>(name);
+      is_open = true;
+    } else {
+      is_open = open_capture(state_->capture, name);
+    }
   } catch (const cv::Exception&) {
   }
   if (!is_open)

@@ -12,8 +12,8 @@ namespace cli {
 
 class CameraSource {
  public:
-  // A file delivers every picture; its times follow from the constant frame rate (else from
-  // OpenCV's position), with clock_id 1.
+  // A file delivers every picture at the container's time (sources/film.h), with clock_id 1, and as
+  // it is stored.
   // A live source reads pictures in a thread of its own and keeps only the latest; skipped pictures
   // set the gap flag of the next one. Its host times are those of the steady clock on arrival; the
   // unknown delay since the exposure is not included.

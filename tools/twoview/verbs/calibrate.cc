@@ -27,6 +27,9 @@ constexpr int kImageSeconds = 5, kFrameSeconds = 2;  // CPU limit of one search
 // wrong.
 constexpr int kTellingViews = 2;
 
+const std::vector<std::string> kFiles = {"camera.yaml",    "camera_info.yaml", "calibration.json",
+                                         "detections.png", "coverage.png",     "residuals.png"};
+
 struct Arguments {
   Common common;
   std::vector<std::string> images;
@@ -70,7 +73,7 @@ size_t count_of(const std::vector<BoardView>& views, Reason reason) {
 // are used.
 std::string reasons_text(const std::vector<BoardView>& views) {
   std::string text;
-  for (int i = 1; i <= static_cast<int>(Reason::kOutlier); ++i) {
+  for (int i = 1; i <= static_cast<int>(Reason::kOtherSize); ++i) {
     const auto reason = static_cast<Reason>(i);
     const size_t count = count_of(views, reason);
     if (count > 0)
@@ -157,12 +160,21 @@ std::vector<BoardView> find_views(Arguments& a, cv::Size& image) {
             "; move the board (Ctrl-C: enough)\n");
     return num_found < a.max_views;
   };
+  const auto leave_out = [&](const std::string& name, bool is_unreadable,
+                             const std::string& detail) {
+    BoardView view;
+    view.name = name;
+    view.reason = is_unreadable ? Reason::kUnreadable : Reason::kOtherSize;
+    view.detail = detail;
+    view.thumbnail = cv::Mat::zeros(3, 4, CV_8U);
+    views.push_back(view);
+  };
   if (a.video.empty())
-    read_images(a.images, take);
+    read_images(a.images, take, leave_out);
   else if (live)
     read_live(a.video, a.duration_s, take);
   else
-    read_video_file(a.video, take);
+    for (const std::string& note : read_video_file(a.video, take)) a.common.note(note);
   reject_blurred(views);
   reject_duplicates(views, image);
   reject_surplus(views, a.max_views);
@@ -362,6 +374,7 @@ int calibrate(Arguments& a) {
   OutputSet files(a.common.output);
   for (const std::string& image : a.images) files.keep(image);
   if (!a.video.empty()) files.keep(a.video);
+  files.require_own({"calibrate", kFiles, {"calibration.json"}, {}});
   // The searches run in forked processes, in which OpenCV's threads would not exist.
   cv::setNumThreads(1);
   cv::Size image;

@@ -9,12 +9,6 @@
 #include "base/terminal.h"
 
 namespace cli {
-namespace {
-
-constexpr int kFewBits = 14;  // of 16: cameras of 10, 12 and 14 bits that do not fill the sample
-
-}  // namespace
-
 void add_common(CLI::App& verb, Common& common, unsigned groups, const std::string& output_help) {
   CLI::Option* output = verb.add_option("-o,--output", common.output, output_help);
   output->required();
@@ -59,11 +53,7 @@ void bring_to_size(Picture& picture, Common& common) {
                 std::to_string(height) + " at " + std::to_string(picture.luma.cols) + "x" +
                 std::to_string(picture.luma.rows) + " (--resize 0: as they are)");
   }
-  if (picture.used_bits > 0 && picture.used_bits <= kFewBits)
-    common.note("image " + picture.name + " has 16 bits a sample and uses " +
-                std::to_string(picture.used_bits) +
-                " of them, so it is dark: multiply its samples by " +
-                std::to_string(1 << (16 - picture.used_bits)));
+  if (picture.is_stretched) common.note(kStretchedNote);
 }
 
 std::string watch_text(const Options& options) {

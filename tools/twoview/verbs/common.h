@@ -36,8 +36,8 @@ void add_common(CLI::App& verb, Common& common, unsigned groups, const std::stri
 // It is noted where the mask leaves nothing out.
 void add_picture_mask(const std::string& name, Picture& picture, Common& common);
 
-// Scales the picture down as --resize says, or a large one by itself, which is noted. A picture
-// of 16-bit samples of which only few bits are used is noted as well.
+// Scales the picture down as --resize says, or a large one by itself, which is noted. That a
+// picture of 16-bit samples was stretched is noted as well.
 void bring_to_size(Picture& picture, Common& common);
 
 // What a long search is doing, for Stopwatch.

@@ -25,6 +25,7 @@ int detect(Arguments& a) {
   add_picture_mask(picture.name, picture, common);
   bring_to_size(picture, common);
   OutputSet files(common.output);
+  files.require_own({"detect", {"keypoints.csv", "keypoints.png"}, {"keypoints.csv"}, {}});
   files.keep(a.image);
   for (const std::string& mask : common.options.masks.files()) files.keep(mask);
   Session session(common.options);

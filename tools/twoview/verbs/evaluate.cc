@@ -27,6 +27,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 constexpr double kFailed = std::numeric_limits<double>::infinity();
+constexpr size_t kMaxReportBytes = size_t{1} << 30;
 constexpr int kThresholdsDeg[] = {5, 10, 20};
 
 struct Arguments {
@@ -364,6 +365,19 @@ Cameras load_cameras(Arguments& a) {
   return cameras;
 }
 
+// Refuses to replace a report.json that is not of this verb: compare and colmap import write one
+// too.
+void require_own_report(const fs::path& path) {
+  std::error_code ignored;
+  if (!fs::is_regular_file(path, ignored) || fs::file_size(path, ignored) == 0) return;
+  const Json report = Json::parse(read_file(path.string(), kMaxReportBytes), nullptr, false);
+  const bool is_own = report.is_object() && report.contains("options") &&
+                      report["options"].is_object() && report["options"].contains("max_keypoints");
+  if (!is_own)
+    throw BadInput(path.string() +
+                   " is not of an earlier run of twoview evaluate: give another -o");
+}
+
 int evaluate(Arguments& a) {
   Common& common = a.common;
   if (common.options.estimate.method == TV_SOLVER_UPRIGHT)
@@ -384,6 +398,7 @@ int evaluate(Arguments& a) {
   OutputSet files(folder);
   files.keep(a.pairs);
   files.keep(camera_path(a.camera));
+  require_own_report(folder / name);
   Session session(common.options);
   std::vector<PairReport> reports;
   {

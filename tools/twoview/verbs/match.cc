@@ -50,6 +50,7 @@ int match(Arguments& a) {
     bring_to_size(picture[i], common);
   }
   OutputSet files(common.output);
+  files.require_own({"match", {"matches.csv", "matches.png"}, {"matches.csv", "matches.png"}, {}});
   for (const std::string& image : a.image) files.keep(image);
   for (const std::string& mask : common.options.masks.files()) files.keep(mask);
   Session session(common.options);

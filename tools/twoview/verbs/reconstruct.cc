@@ -2,6 +2,7 @@
 // report.
 
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 
 #include "base/error.h"
@@ -120,8 +121,25 @@ void note_turns(const Picture pictures[2], Common& common) {
     common.note(pictures[0].name + " and " + pictures[1].name +
                 " were taken with the camera held differently (EXIF): hold it the same way");
   else if (turn != 0)
-    common.note(std::string("the pictures are used as they are stored, ") +
-                (turn == 180 ? "upside down" : "lying on their side") + " (EXIF): so is the cloud");
+    common.note(stored_words(turn) + " (EXIF): so is the cloud");
+}
+
+// Turns a picture as a viewer does where the camera that is given for it is of that size, and not
+// of the stored picture's.
+void turn_to_cameras(const Arguments& a, Picture pictures[2], Common& common) {
+  const std::array<std::string, 2> files = a.cameras.files();
+  for (size_t i = 0; i < 2; ++i) {
+    Picture& picture = pictures[i];
+    std::error_code ignored;
+    if (files[i].empty() || picture.turn_deg % 180 == 0) continue;
+    if (!std::filesystem::is_regular_file(camera_path(files[i]), ignored)) continue;  // a pipe
+    const tv_camera camera = load_camera(files[i], picture.name);
+    if (camera.width != picture.luma.rows || camera.height != picture.luma.cols) continue;
+    if (camera.width == camera.height) continue;
+    turn(picture, -picture.turn_deg / 90);
+    picture.turn_deg = 0;
+    common.note("the pictures are turned as a viewer does (EXIF): the camera is of that size");
+  }
 }
 
 // The cameras of two images. A method that can do without cameras takes those that are given, and
@@ -171,6 +189,7 @@ ImageCameras load_inputs(Arguments& a, RecordingInput* recording, Session& sessi
     recording->load(cameras[0].camera, session, a.common.options, progress, outcome);
   } else {
     for (int i = 0; i < 2; ++i) outcome.picture[i] = load_picture(a.image[i]);
+    turn_to_cameras(a, outcome.picture, a.common);
     note_turns(outcome.picture, a.common);
     cameras = choose_cameras(a, outcome.picture);
     set_calibration_sigmas(a.common.options, cameras);
@@ -415,6 +434,7 @@ int reconstruct(Arguments& a) {
   for (const std::string& mask : common.options.masks.files()) files.keep(mask);
   for (const std::string& camera : a.cameras.files()) files.keep(camera_path(camera));
   files.keep(a.truth);
+  files.require_own({"reconstruct", kFiles, {"result.json", "matches.png"}, {}});
   uint64_t total_ns = 0;
   {
     const Stopwatch watch(!common.quiet, watch_text(common.options));
@@ -443,6 +463,7 @@ int reconstruct(Arguments& a) {
   outcome.json["kernels"] = session.kernels();
   note_still_matches(outcome.two_view, common);
   outcome.notes = common.notes;
+  outcome.json["notes"] = outcome.notes;
   make_files(outcome, files);
 
   if (common.json) print(json_text(outcome.json));

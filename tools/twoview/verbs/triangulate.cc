@@ -246,6 +246,7 @@ int triangulate(Arguments& a) {
   files.keep(a.pose);
   for (const std::string& camera : camera_files) files.keep(camera_path(camera));
   for (const std::string& image : a.images) files.keep(image);
+  if (!is_file) files.require_own({"triangulate", {"points.csv", "cloud.ply"}, {"points.csv"}, {}});
   const Json json = result(a, points, pose, cameras);
   add_files(output, points_csv(points), cloud_ply(cloud(points, a.max_error_px), "that of t"),
             files);

@@ -130,6 +130,7 @@ int undistort(Arguments& a) {
   OutputSet files(common.output);
   if (!a.camera.empty()) files.keep(camera_path(a.camera));
   for (const std::string& image : a.images) files.keep(image);
+  files.require_own({"undistort", {"camera.yaml"}, {}, {"calibration.json"}});
   const Map map = map_to(lens, pinhole);
   const double share = cv::countNonZero(map.seen) / static_cast<double>(map.seen.total());
   if (share == 0)

@@ -240,7 +240,7 @@ def _model(arguments):
     from .cameras import film_camera, read_camera, read_sigmas
     from .images import read_luma
     from .model import text_model
-    from .output import write_files
+    from .output import require_own, write_files
     from .trajectory import write_trajectory
     from .two_view_model import reconstruct
     a = arguments
@@ -253,6 +253,8 @@ def _model(arguments):
         files = (a.camera, a.camera1 or a.camera)
         cameras = [read_camera(path) for path in files]
         sigmas = [read_sigmas(path) for path in files]
+    files = ("cameras.txt", "images.txt", "points3D.txt", "trajectory.tum")
+    require_own(a.output, "colmap model", files, files)
     names = [os.path.basename(path) for path in a.images]
     if names[0] == names[1]:
         raise BadInput(

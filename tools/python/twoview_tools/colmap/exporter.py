@@ -9,6 +9,7 @@ from typing import Any, Optional
 import numpy as np
 import twoview as tv
 
+from ..folders import left_out_words
 from ..sizes import LARGE_SIDE, USUAL_SIDE
 from . import conventions
 from .cameras import CameraChoice, resized
@@ -60,12 +61,13 @@ class Job:
 def choose_pairs(job):
     """The [Pair] to match, each pair once; all images must exist."""
     if not job.pairs:
-        names, unread = list_images(job.images)
+        names, left_out = list_images(job.images)
+        words = left_out_words(left_out, job.images)
         if len(names) < 2:
             raise BadInput(f"{job.images}: {len(names)} images in it, two and more are needed"
-                           + (f"; {unread}" if unread else ""))
-        if unread:
-            print(f"twoview: note: {unread}", file=sys.stderr)
+                           + (f"; {words}" if words else ""))
+        if words:
+            print(f"twoview: note: {words}", file=sys.stderr)
         return sequential(names, job.overlap) if job.overlap else exhaustive(names)
     pairs, seen = [], set()
     for pair in read_pairs(job.pairs):
@@ -90,24 +92,31 @@ def _intrinsics(job, pairs):
     return dict(sorted(given.items()))
 
 
-def _advise_on_size(job, name):
+def _advise_on_size(name, luma):
     """Says that the images are used as they are, where the first of them, `name`, is large."""
-    height, width = read_luma(os.path.join(job.images, name)).shape
+    height, width = luma.shape
     if max(width, height) > LARGE_SIDE:
         print(f"twoview: note: images above {LARGE_SIDE} pixels a side are used as they are: "
               f"{name} is {width}x{height}; --resize {USUAL_SIDE} is advised", file=sys.stderr)
 
 
 def _describe_images(job, pairs, engine):
+    """{name: View} of the pairs' images. One that cannot be read is left out, and named in a note;
+    BadInput where no pair is left."""
     folders = [os.path.dirname(os.path.abspath(job.pairs))] if job.pairs else []
     folders += [job.images, os.path.dirname(os.path.abspath(job.images))]
     choice = CameraChoice(job.cameras, folders, job.focal_35mm)
-    views, masks = {}, Masks(job.mask)
+    views, masks, left_out = {}, Masks(job.mask), []
     intrinsics = _intrinsics(job, pairs)
-    if job.resize is None and intrinsics:
-        _advise_on_size(job, next(iter(intrinsics)))
     for name, K in progress(intrinsics.items(), "image", job.quiet):
-        luma = read_luma(os.path.join(job.images, name))
+        path = os.path.join(job.images, name)
+        try:
+            luma = read_luma(path)
+        except BadInput as error:
+            left_out.append((name, str(error).removeprefix(f"image {path}").lstrip(": ")))
+            continue
+        if job.resize is None and not views:
+            _advise_on_size(name, luma)
         camera = choice.of(name, luma.shape[1], luma.shape[0], K)
         mask = masks.of(name, luma)
         if job.resize:
@@ -115,6 +124,11 @@ def _describe_images(job, pairs, engine):
             luma = shrunk(luma, job.resize)
             camera = resized(camera, luma.shape[1], luma.shape[0])
         views[name] = View(camera, *engine.extract(luma, name, mask))
+    words = left_out_words(left_out, job.images)
+    if not any(pair.name0 in views and pair.name1 in views for pair in pairs):
+        raise BadInput(f"no pair of images can be read: {words}")
+    if words:
+        print(f"twoview: note: {words}", file=sys.stderr)
     return views
 
 
@@ -206,6 +220,7 @@ def export(job, feature=None, match=None, estimate=None):
     with (appended_database if job.append else new_database)(job.database, schema) as writer:
         pairs = choose_pairs(job)
         views = _describe_images(job, pairs, engine)
+        pairs = [pair for pair in pairs if pair.name0 in views and pair.name1 in views]
         known = _Known(job)
         ids = _write_images(writer, known, views)
         counts = {"images": len(views), "new_images": len(set(views) - set(known.images)),

@@ -2,29 +2,56 @@
 
 import math
 import os
+import re
 
 import numpy as np
 
-from ..unread import left_out, unread_picture
+from ..folders import natural_key
+from ..unread import unread_picture, unread_pictures
 from .errors import BadInput
 
-EXTENSIONS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", ".webp")
+EXTENSIONS = (".png", ".jpg", ".jpeg", ".jpe", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", ".pnm",
+              ".pbm", ".webp", ".jp2")
 
 
 def list_images(folder):
-    """(the names of the files with one of EXTENSIONS below a folder, sorted, without hidden ones; a
-    line on pictures of formats that are not read, or ""). As in COLMAP, / separates folders."""
+    """(the names of the files with one of EXTENSIONS below a folder in their natural order; [(name,
+    why)] of the pictures that are left out: hidden files and formats that are not read). As in
+    COLMAP, / separates folders."""
     if not os.path.isdir(folder):
         raise BadInput(f"{folder}: no such folder")
-    names = sorted(os.path.relpath(os.path.join(root, file), folder).replace(os.sep, "/")
-                   for root, _, files in os.walk(folder) for file in files
-                   if not file.startswith("."))
-    return [name for name in names if name.lower().endswith(EXTENSIONS)], left_out(folder, names)
+    names = sorted((os.path.relpath(os.path.join(root, file), folder).replace(os.sep, "/")
+                    for root, _, files in os.walk(folder) for file in files), key=natural_key)
+    pictures = [name for name in names if name.lower().endswith(EXTENSIONS)]
+    hidden = [name for name in pictures if any(part.startswith(".") for part in name.split("/"))]
+    left_out = [(name, "is a hidden file (its name begins with a dot)") for name in hidden]
+    known = set(hidden)
+    return ([name for name in pictures if name not in known],
+            left_out + unread_pictures(folder, names))
+
+
+def _white(path):
+    """The largest sample of a binary PNM file, or of one of 16 bits, by its header; 0 for other
+    files, and for numbers of 8 bits, which OpenCV scales itself."""
+    with open(path, "rb") as file:
+        head = file.read(4096)
+    if head[:2] not in (b"P2", b"P3", b"P5", b"P6"):
+        return 0
+    words = re.sub(rb"#[^\n]*", b"", head[2:]).split(None, 3)
+    white = int(words[2]) if len(words) > 2 and words[2].isdigit() else 0
+    return white if white > 255 or head[1:2] in b"56" else 0
+
+
+def _to_8_bits(image, low, high):
+    """Samples so that `low` becomes 0 and `high` 255, rounded; beyond them they are cut off."""
+    above = np.clip(image.astype(np.int64) - low, 0, high - low)
+    return ((510 * above + high - low) // (2 * (high - low))).astype(np.uint8)
 
 
 def decode(path, keeps_depth=False):
     """Decodes to 8 bits (or 16, where the file has them and `keeps_depth`) and 1, 3 (BGR) or 4
-    (BGRA) channels, with the pixels as they are stored."""
+    (BGRA) channels, with the pixels as they are stored; samples of 16 bits become 8 by the rule of
+    tools/twoview/files/image_file.h."""
     # OpenCV reads this variable when it is imported: OFF, so that only our own error line is
     # printed.
     os.environ.setdefault("OPENCV_LOG_LEVEL", "OFF")
@@ -38,9 +65,17 @@ def decode(path, keeps_depth=False):
     if image is None:
         unread = unread_picture(path)
         raise BadInput(f"image {path} {unread}" if unread else
-                       f"image {path}: not an image that OpenCV reads")
-    if image.dtype == np.uint16 and not keeps_depth:  # samples are divided by 257 and rounded
-        image = ((image.astype(np.uint32) + 128) // 257).astype(np.uint8)
+                       f"image {path} is no image that OpenCV reads")
+    white = _white(path)
+    if image.dtype == np.uint8 and 0 < white < 255:
+        image = _to_8_bits(image, 0, white)
+    if image.dtype == np.uint16 and not keeps_depth:
+        white = white if 255 < white < 65535 else 65535
+        ordered = np.sort(image, axis=None)
+        low, high = (int(ordered[max(1, -(-per_mille * ordered.size // 1000)) - 1])
+                     for per_mille in (5, 995))
+        stretches = high > low and 2 * (high - low) < white
+        image = _to_8_bits(image, *((low, high) if stretches else (0, white)))
     if image.dtype not in (np.uint8, np.uint16):
         raise BadInput(f"image {path}: samples of {image.dtype}, not of 8 or 16 bits")
     if image.ndim == 3 and image.shape[2] not in (3, 4):

@@ -8,12 +8,13 @@ import numpy as np
 import twoview as tv
 
 from ..accuracy import metrics  # pose errors have the definition of the accuracy tables
+from ..folders import foreign_words
 from . import database as db
 from .cameras import read_camera, read_sigmas, write_camera_set
 from .conventions import camera_from_colmap, pixels_from_colmap
 from .engine import Engine
 from .errors import BadInput
-from .output import write_files
+from .output import require_own, write_files
 from .pairs import exhaustive, read_pairs, sequential, write_pair
 from .progress import progress
 from .trajectory import write_trajectory
@@ -82,6 +83,8 @@ def import_model(model, folder, pairs_file="", overlap=0, min_common_points=30):
     """Writes pairs.txt (with the truth), cameras.yaml and trajectory.tum of a model. Without a
     pairs file, pairs with fewer than min_common_points points in common are left out. Returns the
     number of pairs."""
+    names = ("pairs.txt", "cameras.yaml", "trajectory.tum")
+    require_own(folder, "colmap import --model", names, names)
     cameras, cameras_text = _named_cameras(model)
     lines = []
     for pair in _choose(list(model.images), pairs_file, overlap):
@@ -199,6 +202,19 @@ def _pair_report(name0, name1, features, engine, truth, options):
     return row
 
 
+def _require_own_report(folder):
+    """Refuses a folder whose report.json is that of another verb (evaluate, compare)."""
+    try:
+        with open(os.path.join(folder, "report.json"), encoding="utf-8") as file:
+            report = json.load(file)
+    except OSError:
+        return
+    except ValueError:
+        report = {}
+    if not isinstance(report, dict) or "database" not in report.get("options", {}):
+        raise BadInput(foreign_words(folder, "report.json", "colmap import --database"))
+
+
 def import_database(
     path,
     folder,
@@ -216,6 +232,7 @@ def import_database(
     the database, or all pairs if none has. The truth is that of `model`, else that of the pairs
     file. sigmas_of: from the two cameras' CalibrationSigmas to the standard deviations of
     EstimateOptions, {name: value}; None: as the cameras say."""
+    _require_own_report(folder)
     features = Features(path, camera_files)
     if pairs_file or overlap or not features.matches:
         pairs = _choose(list(features.pixels), pairs_file, overlap)

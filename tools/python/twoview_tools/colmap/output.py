@@ -2,7 +2,16 @@
 
 import os
 
+from ..folders import foreign_result, foreign_words
 from .errors import BadInput
+
+
+def require_own(folder, verb, names, always):
+    """Refuses a folder whose files of these names are not of an earlier run of the verb, which
+    leaves `always` in every run."""
+    name = foreign_result(folder, names, always)
+    if name:
+        raise BadInput(foreign_words(folder, name, verb))
 
 
 def write_files(folder, texts):

@@ -12,6 +12,8 @@ import numpy as np
 
 from .. import formats
 from ..accuracy import datasets
+from ..folders import foreign_result, foreign_words
+from ..progress import Lines, on_terminal
 from ..sizes import MAX_NATIVE_SIDE, RESIZE_LONG_SIDE
 from ..unread import unread_picture
 from . import cluster, results, systems
@@ -230,7 +232,7 @@ class Store:
 
 
 def shows_progress(quiet):
-    return not quiet and sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
+    return not quiet and on_terminal()
 
 
 def run_pairs(tasks, keys, workers, store, quiet):
@@ -244,12 +246,15 @@ def run_pairs(tasks, keys, workers, store, quiet):
               file=sys.stderr)
     with tqdm(total=len(tasks), initial=len(tasks) - len(todo), unit="pair", smoothing=0.05,
               disable=not shows_progress(quiet), file=sys.stderr) as bar:
+        lines, num_done = Lines(PROGRAM, wanted=not quiet), len(tasks) - len(todo)
         for number, result in workers.run([tasks[i] for i in todo]):
             index = todo[number]
             store.put(keys[index], result)
             found[index] = result
             bar.set_postfix_str(f"{result['name0']} {result['name1']}", refresh=False)
             bar.update()
+            num_done += 1
+            lines.tell(f"{num_done} of {len(tasks)} pairs")
     return found, len(todo)
 
 
@@ -264,6 +269,9 @@ def compare(arguments):
     folder = os.path.abspath(arguments.output)
     if os.path.exists(folder) and not os.path.isdir(folder):
         raise BadInput(f"-o: {folder} is a file")
+    files = ("index.html", "pairs.csv", "report.json")
+    if name := foreign_result(folder, files, files):
+        raise BadInput(foreign_words(arguments.output, name, "compare"))
     try:
         store = Store(os.path.join(folder, "unfinished"))
     except OSError as error:

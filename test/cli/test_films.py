@@ -1,0 +1,163 @@
+#!/usr/bin/env python3
+"""Tests of films as a source of `twoview odometry`: the container's own times, turns, pixels that
+are not square, and films that are cut off or hold no pictures."""
+import math
+
+from cli_support import CliTest, camera_yaml, main, png
+from films import MIRROR, QUARTERS, mov
+from test_odometry import COUNT, FOCAL, FPS, HEIGHT, LUMA, PICTURES, TIMES, TUM_TRUTH, WIDTH
+
+# Two rates, as phones film when the light goes: 25 and then 10 pictures a second.
+UNEVEN = [i / 25 if i < COUNT // 2 else (COUNT // 2) / 25 + (i - COUNT // 2) / 10
+          for i in range(COUNT)]
+FOCAL_35MM = FOCAL * math.hypot(36, 24) / math.hypot(WIDTH, HEIGHT)
+
+
+def truth_at(times):
+    return "".join(f"{t:.9f} {0.1 * i} 0 0 0 0 0 1\n" for i, t in enumerate(times))
+
+
+def turned(luma, width, height, degrees):
+    """(the bytes, the width, the height) of a picture turned clockwise."""
+    rows = [luma[y * width:(y + 1) * width] for y in range(height)]
+    for _ in range(degrees // 90):
+        rows = [bytes(column) for column in zip(*reversed(rows))]
+    return b"".join(rows), len(rows[0]), len(rows)
+
+
+class Films(CliTest):
+    def odometry(self, source, *more):
+        return self.run_program("odometry", source, "-o", self.out, *more)
+
+    def track(self, film, *more, camera=None, truth=TUM_TRUTH, ending=".mov"):
+        path = self.write("film" + ending, film)
+        camera = ("--camera", self.write("film.yaml", camera or camera_yaml()))
+        if "--focal-35mm" in more:
+            camera = ()
+        done = self.odometry(path, *camera, "--truth", self.write("truth", truth), *more)
+        self.succeed(done)
+        return self.result()
+
+    def assert_right(self, result, percent=1.0):
+        self.assertEqual(result["truth"]["num_compared"], COUNT)
+        self.assertLess(result["truth"]["ate_rmse_percent_of_path"], percent)
+
+    def times(self):
+        rows = (self.out / "frames.csv").read_text().splitlines()[1:]
+        return [float(row.split(",")[0]) for row in rows]
+
+    def test_pictures_have_the_times_of_the_container(self):
+        result = self.track(mov(PICTURES, UNEVEN), truth=truth_at(UNEVEN))
+        self.assert_right(result)
+        for time, true in zip(self.times(), UNEVEN):
+            self.assertAlmostEqual(time, true, 4)
+        film = result["film"]
+        self.assertEqual((film["times"], film["variable_rate"]), ("container", True))
+        self.assertAlmostEqual(film["rate_hz"], (COUNT - 1) / UNEVEN[-1], 3)
+        self.assertIn("rate varies, 0.04 to 0.1 s", " ".join(result["notes"]))
+
+    def test_a_steady_film_has_no_notes(self):
+        for timescale in (90000, 1000, 600):  # milliseconds round each time
+            result = self.track(mov(PICTURES, [i / 30 for i in range(COUNT)], timescale=timescale),
+                                truth=truth_at([i / 30 for i in range(COUNT)]))
+            self.assert_right(result)
+            self.assertEqual(result["notes"], [])
+            self.assertEqual(result["film"]["variable_rate"], False)
+            self.assertAlmostEqual(result["film"]["rate_hz"], 30, 1)
+
+    def test_times_count_from_the_first_picture(self):
+        film = mov(PICTURES, TIMES, start_s=5)
+        for truth in (truth_at(TIMES), truth_at([t + 5 for t in TIMES])):
+            result = self.track(film, truth=truth)
+            self.assert_right(result)
+            self.assertEqual(self.times()[0], 0)
+            self.assertAlmostEqual(result["film"]["clock_start_s"], 5, 3)
+            self.assertIn("clock begins at 5 s", " ".join(result["notes"]))
+
+    def test_a_given_rate_stands_in_place_of_the_films_times(self):
+        result = self.track(mov(PICTURES, UNEVEN), "--fps", FPS)
+        self.assert_right(result)
+        self.assertEqual(result["film"]["times"], "given")
+        self.assertIn("--fps stands in place of the film's own times", result["notes"][0])
+
+    def test_every_and_max_frames_keep_the_times(self):
+        self.track(mov(PICTURES, UNEVEN), "--every", 2, "--max-frames", 9, truth=truth_at(UNEVEN))
+        for time, true in zip(self.times(), UNEVEN[0:18:2]):
+            self.assertAlmostEqual(time, true, 4)
+
+    def test_a_picture_that_repeats_a_time_is_left_out(self):
+        times = list(TIMES)
+        times[5] = times[4]
+        result = self.track(mov(PICTURES, times), truth=truth_at(TIMES))
+        self.assertEqual(result["film"]["num_left_out"], 1)
+        self.assertEqual(result["num_frames"], COUNT - 1)
+        self.assertIn("1 picture of the film is left out", " ".join(result["notes"]))
+
+    def test_a_turned_film_is_used_as_it_is_stored(self):
+        for degrees in (90, 180, 270):
+            with self.subTest(degrees=degrees):
+                result = self.track(mov(PICTURES, TIMES, turn=QUARTERS[degrees]))
+                self.assert_right(result)
+                self.assertEqual(result["film"]["rotation_deg"], degrees)
+                self.assertIn(f"a player turns them by {degrees} degrees clockwise",
+                              result["notes"][0])
+        result = self.track(mov(PICTURES, TIMES, turn=MIRROR))
+        self.assert_right(result)
+        self.assertTrue(result["film"]["mirrored"])
+        self.assertIn("a player mirrors them", result["notes"][0])
+
+    def test_a_turned_film_fits_a_camera_of_the_turned_size(self):
+        # The principal point lies off the middle, so that a turn to the wrong side shows.
+        for degrees in (90, 270):
+            with self.subTest(degrees=degrees):
+                stored = []
+                for luma in LUMA:  # what a player turns back
+                    data, width, height = turned(luma, WIDTH, HEIGHT, 360 - degrees)
+                    stored.append(png(width, height, data))
+                result = self.track(mov(stored, TIMES, turn=QUARTERS[degrees]))
+                self.assert_right(result)
+                self.assertIn("are turned by", result["notes"][0])
+                # Upright, the camera flies along x; lying, along y.
+                rows = (self.out / "trajectory.txt").read_text().splitlines()
+                x, y = (abs(float(rows[-1].split()[k])) for k in (1, 2))
+                self.assertLess(y, 0.05 * x)
+
+    def test_pixels_that_are_not_square_are_those_of_the_camera(self):
+        narrow = []  # three quarters as wide: 240 x 240
+        for luma in LUMA:
+            rows = [luma[y * WIDTH:(y + 1) * WIDTH] for y in range(HEIGHT)]
+            narrow.append(png(WIDTH * 3 // 4, HEIGHT, b"".join(
+                bytes((row[4 * k // 3] * (3 - k % 3) + row[4 * k // 3 + 1] * (1 + k % 3)) // 4
+                      for k in range(WIDTH * 3 // 4)) for row in rows)))
+        film = mov(narrow, TIMES, pixel_aspect=(4, 3))
+        stored = camera_yaml(width=240, height=240, fx=0.75 * FOCAL, fy=FOCAL, cx=119.5, cy=119.5)
+        runs = [self.track(film, camera=stored), self.track(film, camera=camera_yaml()),
+                self.track(film, "--focal-35mm", FOCAL_35MM)]
+        for result in runs:
+            self.assert_right(result)
+            self.assertAlmostEqual(result["film"]["pixel_aspect"], 4 / 3, 6)
+            self.assertIn("pixels are 1.333 times as wide as high", result["notes"][0])
+            self.assertAlmostEqual(result["truth"]["ate_rmse"], runs[0]["truth"]["ate_rmse"], 6)
+        self.assertIn("the camera, of square pixels, was scaled", runs[1]["notes"][0])
+
+    def test_a_film_that_ends_early_is_tracked_as_far_as_it_goes(self):
+        whole = mov(PICTURES, [i / 5 for i in range(COUNT)])
+        cut = whole[:sum(map(len, PICTURES)) * 2 // 3] + bytes(
+            len(whole) - sum(map(len, PICTURES)) * 2 // 3)
+        # The index at the end stays, the pictures of the last third are gone.
+        at = whole.index(b"moov") - 4
+        film = cut[:at] + whole[at:]
+        result = self.track(film, truth=truth_at([i / 5 for i in range(COUNT)]))
+        self.assertLess(result["num_frames"] - result["num_unreadable"], COUNT)
+        self.assertTrue(result["notes"])
+
+    def test_what_is_no_film_with_pictures_is_named(self):
+        sound = self.write("sound.mov", mov([PICTURES[0]], [0], sound_only=True))
+        self.assert_refused(self.odometry(sound, "--focal-35mm", 26), "sound.mov",
+                            "no pictures, only sound")
+        cut = self.write("cut.mov", mov(PICTURES, TIMES)[:40000])
+        self.assert_refused(self.odometry(cut, "--focal-35mm", 26), "cut.mov", "cut off")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,118 @@
+#!/usr/bin/env python3
+"""Tests of folders of pictures: their order, and what is left out of them."""
+from cli_support import CliTest, camera_yaml, main, png
+from test_odometry import COUNT, FPS, HEIGHT, PICTURES, TIMES, TUM_TRUTH, WIDTH
+
+HIDDEN = "is a hidden file (its name begins with a dot)"
+
+
+class Folders(CliTest):
+    def fill(self, name="frames", first=1, pattern="frame{}.png"):
+        for i, data in enumerate(PICTURES):
+            self.write(f"{name}/" + pattern.format(first + i), data)
+
+    def track(self, *more, name="frames", truth=TUM_TRUTH):
+        camera = self.write("own.yaml", camera_yaml())
+        self.succeed(self.run_program("odometry", name, "-o", self.out, "--fps", FPS, "--camera",
+                                      camera, "--truth", self.write("truth", truth), *more))
+        return self.result()
+
+    def names(self):
+        rows = (self.out / "frames.csv").read_text().splitlines()[1:]
+        return [row.split(",")[1] for row in rows]
+
+    def test_digits_count_as_numbers(self):
+        self.fill()
+        result = self.track()
+        self.assertEqual(self.names(), [f"frame{i}.png" for i in range(1, COUNT + 1)])
+        self.assertLess(result["truth"]["ate_rmse_percent_of_path"], 1)
+        self.assertEqual(result["notes"], [])
+
+    def test_numbers_that_are_too_long_for_a_machine_word_count_too(self):
+        self.fill(first=99999999999999999990, pattern="t{}.png")
+        self.assertLess(self.track()["truth"]["ate_rmse_percent_of_path"], 1)
+
+    def test_what_is_no_frame_is_left_out_and_named(self):
+        self.fill()
+        for i in range(1, 4):
+            self.write(f"frames/._frame{i}.png", b"\0\5\x16\7" + bytes(60))
+        self.write("frames/.DS_Store", b"x")
+        self.write("frames/Thumbs.db", b"x")
+        self.write("frames/readme.txt", b"x")
+        self.write("frames/frame0.png", png(64, 48, bytes(64 * 48)))  # would be the first
+        self.write("frames/below/frame5.png", PICTURES[0])
+        self.write("frames/frame3b.NEF", b"II*\0" + bytes(60))
+        result = self.track()
+        self.assertEqual(result["num_frames"], COUNT)
+        self.assertLess(result["truth"]["ate_rmse_percent_of_path"], 1)
+        self.assertEqual(result["notes"], [
+            f"5 pictures of frames are left out: ._frame1.png {HIDDEN} (so are 2 more); "
+            "frame3b.NEF is a camera's raw picture, which is not read: develop it to TIFF, PNG or "
+            f"JPEG; frame0.png is 64x48, not {WIDTH}x{HEIGHT} as most are"])
+
+    def test_a_picture_that_is_cut_off_is_a_missing_frame_also_the_first_one(self):
+        self.fill()
+        for i in (1, 9):
+            self.write(f"frames/frame{i}.png", PICTURES[i - 1][:3000])
+        result = self.track()
+        self.assertEqual((result["num_frames"], result["num_unreadable"]), (COUNT, 2))
+        self.assertEqual(result["truth"]["num_compared"], COUNT - 2)
+        self.assertLess(result["truth"]["ate_rmse_percent_of_path"], 1)
+        self.assertIn("2 frames could not be used, the first: image frames/frame1.png is truncated",
+                      result["notes"])
+
+    def test_a_list_keeps_the_times_of_pictures_that_it_cannot_use(self):
+        self.fill("set/images", first=0, pattern="{:05}.png")
+        self.write("set/frames.txt", "".join(f"{t:.9f} images/{i:05}.png\n"
+                                             for i, t in enumerate(TIMES)))
+        self.write("set/images/00000.png", png(32, 24, bytes(32 * 24)))
+        camera = self.write("own.yaml", camera_yaml())
+        self.succeed(self.run_program("odometry", "set", "-o", self.out, "--camera", camera))
+        result = self.result()
+        self.assertEqual((result["num_frames"], result["num_unreadable"]), (COUNT, 1))
+        self.assertIn("00000.png is 32x24, not 320x240 as most are", " ".join(result["notes"]))
+
+    def test_a_folder_of_which_nothing_is_left_is_refused(self):
+        self.write("none/._0.png", PICTURES[0])
+        run = ("odometry", "none", "-o", self.out, "--fps", 10, "--focal-35mm", 26)
+        self.assert_refused(self.run_program(*run), "no image that is read", HIDDEN)
+        self.write("none/0.png", PICTURES[0][:2000])
+        self.assert_refused(self.run_program(*run), "could be used", "0.png is truncated")
+
+
+class Pictures(CliTest):
+    def luma_of(self, data, name):
+        """The keypoints that detect finds in a picture."""
+        self.succeed(self.run_program("detect", self.write(name, data), "-o", self.out))
+        return (self.out / "keypoints.csv").read_bytes()
+
+    def test_a_pnm_files_own_white_is_white(self):
+        grey = [value // 16 for value in self.left()]  # 0 to 15
+        plain = self.luma_of(png(WIDTH, HEIGHT, bytes(17 * v for v in grey)), "plain.png")
+        head = b"P5\n# white is small\n%d %d\n%d\n"
+        for white, size in ((15, 1), (60, 1), (4095, 2), (15 * 257, 2)):
+            step = white // 15
+            data = b"".join((v * step).to_bytes(size, "big") for v in grey)
+            with self.subTest(white=white):
+                self.assertEqual(self.luma_of(head % (WIDTH, HEIGHT, white) + data, "p.pgm"), plain)
+        data = b"".join((v * 4369).to_bytes(2, "big") for v in grey)
+        self.assertEqual(self.luma_of(head % (WIDTH, HEIGHT, 65535) + data, "p.pgm"), plain)
+
+    def test_sixteen_bits_of_which_few_are_used_are_stretched(self):
+        left = self.left()
+        plain = png(WIDTH, HEIGHT, left)
+        thermal = png(WIDTH, HEIGHT, [7000 + 3 * v for v in left], depth=16)
+        self.luma_of(plain, "plain.png")
+        most = len((self.out / "keypoints.csv").read_text().splitlines())
+        done = self.run_program("detect", self.write("t.png", thermal), "-o", self.out)
+        self.assertIn(b"note         16-bit pictures that use less than half", done.stdout)
+        count = len((self.out / "keypoints.csv").read_text().splitlines())
+        self.assertGreater(count, 0.8 * most)
+
+    def left(self):
+        from cli_support import stereo_pair
+        return list(stereo_pair()[0])
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,138 @@
+// Why not OpenCV: 4.6 (Debian 12) turns a film of 90 degrees to the wrong side and names the turn
+// 90 where 5.0 says 270, and 5.0.0.93 says 25 pictures a second for every raw H.264 stream
+// (measured 2026-11-29). libavformat is what OpenCV itself asks.
+
+#include "sources/film_container.h"
+
+extern "C" {
+#include <libavformat/avformat.h>
+#include <libavutil/display.h>
+}
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include "base/error.h"
+
+namespace cli {
+namespace {
+
+struct Close {
+  void operator()(AVFormatContext* film) const { avformat_close_input(&film); }
+};
+using Open = std::unique_ptr<AVFormatContext, Close>;
+
+const int32_t* display_matrix(const AVStream& stream) {
+#if LIBAVFORMAT_VERSION_MAJOR >= 61
+  const AVPacketSideData* const data =
+      av_packet_side_data_get(stream.codecpar->coded_side_data, stream.codecpar->nb_coded_side_data,
+                              AV_PKT_DATA_DISPLAYMATRIX);
+  return data != nullptr && data->size >= 9 * sizeof(int32_t)
+             ? reinterpret_cast<const int32_t*>(data->data)
+             : nullptr;
+#else
+  return reinterpret_cast<const int32_t*>(
+      av_stream_get_side_data(&stream, AV_PKT_DATA_DISPLAYMATRIX, nullptr));
+#endif
+}
+
+double seconds(int64_t time, AVRational unit) {
+  return time == AV_NOPTS_VALUE ? 0 : static_cast<double>(time) * av_q2d(unit);
+}
+
+double positive(AVRational ratio) { return ratio.num > 0 && ratio.den > 0 ? av_q2d(ratio) : 0; }
+
+// The turn of a display matrix, which maps (x, y) to (a x + c y, b x + d y), y down. A mirror is
+// taken as one of x, before the turn.
+void add_turn(const int32_t* matrix, FilmContainer& film) {
+  double a = matrix[0], b = matrix[1];
+  const double c = matrix[3], d = matrix[4];
+  film.is_mirrored = a * d - b * c < 0;
+  if (film.is_mirrored) a = -a, b = -b;
+  const double degrees = std::atan2(b, a) * 57.29577951308232;
+  film.turn_deg = std::fmod(degrees + 360, 360);
+}
+
+Open open_film_file(const std::string& path) {
+  av_log_set_level(AV_LOG_QUIET);  // the program prints one line of its own
+  AVFormatContext* opened = nullptr;
+  // The prefix keeps a name such as "a:b.mp4" from being taken for an address.
+  if (avformat_open_input(&opened, ("file:" + path).c_str(), nullptr, nullptr) != 0)
+    throw BadInput("cannot read " + path +
+                   ": it is no film that can be read, or is cut off: record or copy "
+                   "it again");
+  Open film(opened);
+  if (avformat_find_stream_info(film.get(), nullptr) < 0)
+    throw BadInput("cannot read " + path + ": its streams cannot be read");
+  return film;
+}
+
+bool is_pictures(const AVStream& stream) {
+  return stream.codecpar->codec_type == AVMEDIA_TYPE_VIDEO &&
+         (stream.disposition & AV_DISPOSITION_ATTACHED_PIC) == 0;
+}
+
+// Whether the first packet of the stream has a time: those of a raw stream have none.
+bool has_times(AVFormatContext& film, const AVStream& pictures) {
+  AVPacket* packet = av_packet_alloc();
+  bool is_found = false, has_time = false;
+  while (packet != nullptr && !is_found && av_read_frame(&film, packet) >= 0) {
+    is_found = packet->stream_index == pictures.index;
+    has_time = is_found && (packet->pts != AV_NOPTS_VALUE || packet->dts != AV_NOPTS_VALUE);
+    av_packet_unref(packet);
+  }
+  av_packet_free(&packet);
+  return has_time;
+}
+
+}  // namespace
+
+FilmContainer read_film_container(const std::string& path) {
+  const Open film = open_film_file(path);
+  FilmContainer result;
+  AVStream* pictures = nullptr;
+  for (unsigned i = 0; i < film->nb_streams; ++i) {
+    AVStream* const stream = film->streams[i];
+    result.has_sound = result.has_sound || stream->codecpar->codec_type == AVMEDIA_TYPE_AUDIO;
+    if (!is_pictures(*stream)) continue;
+    if (++result.num_picture_streams == 1) pictures = stream;  // the one that OpenCV decodes
+  }
+  if (pictures == nullptr) return result;
+  result.has_pictures = true;
+  result.width = pictures->codecpar->width;
+  result.height = pictures->codecpar->height;
+  result.num_pictures = std::max<int64_t>(0, pictures->nb_frames);
+  result.has_clock = has_times(*film, *pictures);
+  result.rate_hz = positive(pictures->avg_frame_rate);
+  if (!(result.rate_hz > 0)) result.rate_hz = positive(pictures->r_frame_rate);
+  result.clock_start_s = seconds(pictures->start_time, pictures->time_base);
+  result.duration_s = seconds(pictures->duration, pictures->time_base);
+  const double aspect = positive(av_guess_sample_aspect_ratio(film.get(), pictures, nullptr));
+  if (aspect > 0) result.pixel_aspect = aspect;
+  if (const int32_t* const matrix = display_matrix(*pictures)) add_turn(matrix, result);
+  return result;
+}
+
+std::vector<double> picture_times(const std::string& path) {
+  const Open film = open_film_file(path);
+  const AVStream* pictures = nullptr;
+  for (unsigned i = 0; i < film->nb_streams && pictures == nullptr; ++i)
+    if (is_pictures(*film->streams[i])) pictures = film->streams[i];
+  std::vector<double> times;
+  if (pictures == nullptr) return times;
+  const int64_t start = pictures->start_time == AV_NOPTS_VALUE ? 0 : pictures->start_time;
+  AVPacket* packet = av_packet_alloc();
+  while (packet != nullptr && av_read_frame(film.get(), packet) >= 0) {
+    const int64_t time = packet->pts != AV_NOPTS_VALUE ? packet->pts : packet->dts;
+    if (packet->stream_index == pictures->index && time != AV_NOPTS_VALUE &&
+        (packet->flags & AV_PKT_FLAG_DISCARD) == 0)
+      times.push_back(seconds(time - start, pictures->time_base));
+    av_packet_unref(packet);
+  }
+  av_packet_free(&packet);
+  std::sort(times.begin(), times.end());
+  return times;
+}
+
+}  // namespace cli
