@@ -9,9 +9,10 @@ namespace tv {
 namespace {
 
 // A block's surface belongs to a plane if their normals are within 20 degrees and its mean is
-// within a voxel and a half, or three of its standard deviations.
+// within a voxel and a half. (With three of its standard deviations, too, imprecise surfaces make
+// one oblique plane of several parallel ones.)
 constexpr double kLikeNormal = 0.94;
-constexpr double kNearVoxels = 1.5, kNearSigmas = 3;
+constexpr double kNearVoxels = 1.5;
 // What is farther behind a plane than this is not a part of it.
 constexpr double kBehindVoxels = 4;
 // How many candidates a plane is chosen of, and over how many blocks they are compared.
@@ -50,10 +51,14 @@ bool belongs(const Plane& plane, const Surfel& s, double voxel) {
   double cosine = 0;
   for (int i = 0; i < 3; ++i) cosine += plane.normal[i] * static_cast<double>(s.normal[i]);
   if (cosine < kLikeNormal) return false;
-  const double sigmas = kNearSigmas * static_cast<double>(s.sigma);
-  const double most = kNearVoxels * voxel > sigmas ? kNearVoxels * voxel : sigmas;
   const double distance = distance_from(plane, s);
-  return distance <= most && -distance <= most;
+  return distance <= kNearVoxels * voxel && -distance <= kNearVoxels * voxel;
+}
+
+// The weight of a block's surface in a fit: its area, less where it is imprecise.
+double weight_of(const Surfel& s, double voxel) {
+  const double variance = static_cast<double>(s.sigma) * static_cast<double>(s.sigma);
+  return static_cast<double>(s.area) * (voxel * voxel) / (voxel * voxel + variance);
 }
 
 double area_near(const tv_room& room, const Plane& plane, int32_t step) {
@@ -132,7 +137,7 @@ Fit refit(const tv_room& room, const PlaneRequest& request, Plane* plane) {
   for (int32_t k = 0; k < room.end_blocks; ++k) {
     const Surfel& s = room.surfels[k];
     if (s.plane != kOfNone || !belongs(*plane, s, voxel)) continue;
-    const double weight = static_cast<double>(s.area);
+    const double weight = weight_of(s, voxel);
     for (int i = 0; i < 3; ++i) fit.centre[i] += weight * static_cast<double>(s.mean[i]);
     fit.weight += weight;
   }
@@ -147,7 +152,7 @@ Fit refit(const tv_room& room, const PlaneRequest& request, Plane* plane) {
     double from[3];
     for (int i = 0; i < 3; ++i) from[i] = static_cast<double>(s.mean[i]) - fit.centre[i];
     const double row[3] = {dot(u, from), dot(v, from), 1};
-    const double distance = distance_from(*plane, s), weight = static_cast<double>(s.area);
+    const double distance = distance_from(*plane, s), weight = weight_of(s, voxel);
     for (int r = 0; r < 3; ++r) {
       for (int c = 0; c < 3; ++c) A[r][c] += weight * row[r] * row[c];
       b[r] += weight * row[r] * distance;
