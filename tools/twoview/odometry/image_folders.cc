@@ -49,6 +49,7 @@ struct Folder {
   std::optional<Measurements> measurements;
   std::vector<std::string> files;
   std::vector<LeftOut> left_out;
+  std::vector<std::string> notes;  // of its files
 };
 
 class ImageFolder : public FrameSource {
@@ -106,7 +107,7 @@ class ImageFolder : public FrameSource {
   }
   std::vector<std::string> files() const override { return folder_.files; }
   std::vector<std::string> notes() const override {
-    std::vector<std::string> notes;
+    std::vector<std::string> notes = folder_.notes;
     if (!folder_.left_out.empty()) notes.push_back(left_out_words(folder_.left_out, folder_.path));
     if (has_stretched_) notes.push_back(kStretchedNote);
     if (turn_deg_ != 0)
@@ -154,7 +155,7 @@ void read_list(Folder& folder, const std::string& file, double scale, std::strin
 }
 
 void add_note(Folder& folder, const std::string& note) {
-  if (!note.empty()) folder.note += (folder.note.empty() ? "" : "; ") + note;
+  if (!note.empty()) folder.notes.push_back(note);
 }
 
 void add_cameras(Folder& folder) {
@@ -178,7 +179,7 @@ void add_measurements(Folder& folder) {
   const std::string path = (fs::path(folder.path) / "imu.txt").string();
   if (!is_file(path)) return;
   folder.measurements = Measurements::read(path);
-  folder.note = folder.measurements->note();
+  add_note(folder, folder.measurements->note());
   folder.files.push_back(path);
 }
 

@@ -358,10 +358,10 @@ std::optional<FilmLens> lens_of_film(Arguments& a, FrameSource& source,
   if (!is_auto(a)) {
     if (!a.camera.empty() || options->focal_35mm > 0 || !source.can_run_again()) return {};
     SourceFrame first;
-    source.run([](int index) { return index == 0; },
+    source.run([](int) { return true; },  // the first that can be read
                [&first](const SourceFrame& frame) {
                  first = frame;
-                 return false;
+                 return frame.luma.empty();
                },
                stop);
     if (first.luma.empty()) return {};  // which the flight refuses
