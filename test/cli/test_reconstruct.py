@@ -374,7 +374,7 @@ class Reconstruct(cli.CliTest):
             self.assertEqual([c["source"] for c in result["cameras"]], ["estimated"] * 2)
             self.assertEqual(result["options"]["focal_35mm"], more[1] if more else None)
             text = " ".join(done.stdout.decode().split())
-            self.assertIn("note no camera is known (left.png" if not more else
+            self.assertIn("note no camera is known (a.png" if not more else
                           "note the focal length is estimated", text)
             self.assertIn("the focal length is too uncertain for this pose", text)
             self.assertIn("advice the focal length is doubtful: give --focal-35mm", text)
