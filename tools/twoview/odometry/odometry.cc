@@ -38,9 +38,10 @@ namespace fs = std::filesystem;
 const char* const kCameraFile = "corrected_camera.yaml";
 const char* const kStillFile = "still_mask.png";
 const char* const kEstimatedFile = "estimated_camera.yaml";
-const std::vector<std::string> kFiles = {
-    "trajectory.txt", "live.txt",  "keyframes.txt", kCameraFile,   "covariances.txt", kStillFile,
-    "frames.csv",     "cloud.ply", "map.twm",       "report.html", "result.json",     kEstimatedFile};
+const std::vector<std::string> kFiles = {"trajectory.txt", "live.txt",        "keyframes.txt",
+                                         kCameraFile,      "covariances.txt", kStillFile,
+                                         "frames.csv",     "cloud.ply",       "map.twm",
+                                         "report.html",    "result.json",     kEstimatedFile};
 const std::vector<std::string> kAlwaysFiles = {"frames.csv", "live.txt", "result.json"};
 const std::vector<std::string> kColmapFiles = {"cameras.txt", "images.txt", "points3D.txt"};
 
