@@ -91,10 +91,10 @@ std::vector<Phrase> phrases_of(const Outcome& outcome) {
   for (const Phrase& phrase : kReasons) {
     if ((v.reasons & phrase.reason) == 0) continue;
     if (zoomed && phrase.reason == TV_REASON_SECOND_MOTION) continue;
-    const bool of_focal_length = phrase.reason == TV_REASON_LOW_PARALLAX &&
-                                 (outcome.estimates_focal_length ||
-                                  (focal_length_is_uncertain(v) &&
-                                   v.median_parallax_rad > kMuchParallaxRad));
+    const bool of_focal_length =
+        phrase.reason == TV_REASON_LOW_PARALLAX &&
+        (outcome.estimates_focal_length ||
+         (focal_length_is_uncertain(v) && v.median_parallax_rad > kMuchParallaxRad));
     phrases.push_back(of_focal_length ? kFocalLength : phrase);
     const bool same_size = outcome.camera[0].width == outcome.camera[1].width &&
                            outcome.camera[0].height == outcome.camera[1].height;

@@ -24,7 +24,7 @@ struct MetricScale {
 struct Outcome {
   Picture picture[2];
   bool has_cameras = false;
-  bool has_camera_files = false;  // the cameras are from files, not from a focal length alone
+  bool has_camera_files = false;        // the cameras are from files, not from a focal length alone
   bool estimates_focal_length = false;  // nothing was given: it is estimated with the pose
   // The cameras of the images as used: those of the camera files, scaled if the image was resized.
   tv_camera camera[2]{};

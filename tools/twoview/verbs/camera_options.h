@@ -18,8 +18,8 @@ struct ImageCamera {
   enum Source { kNone, kFile, kFocal, kExif, kEstimated } source = kNone;
   tv_camera camera{};
   CalibrationSigmas sigmas{0, 0};
-  std::string file;                // the camera file as given
-  double focal_35mm = 0;           // millimetres, where source is kFocal, kExif or kEstimated (start)
+  std::string file;       // the camera file as given
+  double focal_35mm = 0;  // millimetres, where source is kFocal, kExif or kEstimated (start)
   std::vector<std::string> notes;  // of the file: what was left out, and that it was scaled
   std::string doubt;               // what may be wrong with EXIF's focal length: "; a.jpg was ..."
 };
@@ -58,7 +58,8 @@ ImageCamera camera_to_estimate(const ImageFacts& image);
 // A line that says which focal length EXIF gave; empty where it gave none.
 std::string exif_note(const ImageCameras& cameras);
 
-// A list of two: `source` ("file", "focal_35mm", "exif", "estimated" or null), `file`, `focal_35mm`.
+// A list of two: `source` ("file", "focal_35mm", "exif", "estimated" or null), `file`,
+// `focal_35mm`.
 nlohmann::ordered_json cameras_json(const ImageCameras& cameras);
 
 }  // namespace cli

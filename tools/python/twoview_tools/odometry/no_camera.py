@@ -1,4 +1,5 @@
-"""The same films with their cameras and without: what `--focal-35mm auto` finds, what the path loses
+"""The same films with their cameras and without: what `--focal-35mm auto` finds, what the path
+loses
 by it, and the time it takes."""
 
 import json
@@ -24,7 +25,8 @@ def _run(program, folder, out, options):
 def compare(label, folder, out, program, options=()):
     """The figures of one film: {label, true_px, focal_px, k1, focal_error_percent, sigma_percent,
     uncertain, path_percent, path_ratio, time_ratio}; path figures are None without a truth."""
-    camera = next(iter(formats.read_camera_set(sets.read_set(folder).file("cameras.yaml")).values()))
+    cameras = formats.read_camera_set(sets.read_set(folder).file("cameras.yaml"))
+    camera = next(iter(cameras.values()))
     true_px = math.sqrt(camera.fx * camera.fy)
     known_cost, known = _run(program, folder, os.path.join(out, "known"), list(options))
     cost, found = _run(program, folder, os.path.join(out, "auto"),
@@ -59,7 +61,8 @@ def judged(rows):
     wrong = [row["label"] for row in rows
              if abs(row["focal_error_percent"]) > MOST_FOCAL_ERROR and not row["uncertain"]]
     doubtful = sum(row["uncertain"] for row in rows)
-    yield not wrong, (f"without a camera: focal length within {MOST_FOCAL_ERROR:g} % or doubtful in "
+    yield not wrong, (f"without a camera: focal length within {MOST_FOCAL_ERROR:g} % or "
+                      "doubtful in "
                       f"{len(rows) - len(wrong)} of {len(rows)} films ({doubtful} doubtful)")
     ratios = [row["path_ratio"] for row in rows if row["path_ratio"] is not None]
     good = sum(ratio <= MOST_PATH_RATIO for ratio in ratios)
