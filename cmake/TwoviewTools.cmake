@@ -7,7 +7,7 @@ find_package(nlohmann_json QUIET)
 find_package(PkgConfig QUIET)
 if(PkgConfig_FOUND)
   pkg_check_modules(libexif QUIET IMPORTED_TARGET GLOBAL libexif)
-  pkg_check_modules(libavformat QUIET IMPORTED_TARGET GLOBAL libavformat libavutil)
+  pkg_check_modules(libavformat QUIET IMPORTED_TARGET GLOBAL libavformat libavcodec libavutil)
   # Optional: the page of `twoview odometry --live`.
   pkg_check_modules(libmicrohttpd QUIET IMPORTED_TARGET GLOBAL libmicrohttpd)
 endif()
