@@ -1,0 +1,129 @@
+"""A room's surface out of a flight: for each keyframe the views that show its scene from elsewhere,
+its depth map, and the fusion of all."""
+
+import time
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+import twoview as tv
+
+# A partner's distance from the keyframe that is aimed at, as a share of the median depth, and on
+# which side of the first one it should lie.
+WANTED = ((0.1, 1), (0.1, -1), (0.2, 1), (0.2, -1))
+NEIGHBOURS = 120  # frames before and after a keyframe among which its partners are looked for
+MOST_TURN = 0.35  # radians between the axes of a keyframe and a partner
+LEAST_WITNESSES = 2  # of a depth that is measured
+
+
+@dataclass
+class Settings:
+    voxel: float = 0.03  # in the unit of the poses
+    memory_mib: int = 64
+    measured_only: bool = True  # planes across plain walls are right too seldom yet
+    min_maps: int = 2
+
+
+@dataclass
+class Model:
+    vertices: np.ndarray  # of twoview.ROOM_VERTEX
+    triangles: np.ndarray
+    planes: np.ndarray
+    voxel: float
+    keyframes: list = field(default_factory=list)  # (index of the frame, DepthMap)
+    ms_depth: float = 0.0  # CPU time a keyframe
+    ms_fusion: float = 0.0
+    ms_mesh: float = 0.0  # in all
+
+
+def choose_partners(flight, index, median_depth):
+    """The frames that show the keyframe's scene from a fitting distance, in different directions."""
+    first = max(0, index - NEIGHBOURS)
+    others = np.array([i for i in range(first, min(len(flight.names), index + NEIGHBOURS + 1))
+                       if i != index])
+    away = (flight.centres[others] - flight.centres[index]) @ flight.R[index]
+    length = np.linalg.norm(away, axis=1)
+    cosine = (np.einsum("kij,ij->k", flight.R[others], flight.R[index]) - 1) / 2
+    turn = np.arccos(np.clip(cosine, -1, 1))
+    usable = (length > 0.02 * median_depth) & (turn < MOST_TURN)
+    others, away, length, turn = others[usable], away[usable], length[usable], turn[usable]
+    chosen, direction = [], None
+    unit = away / np.maximum(length, 1e-9)[:, None]
+    for share, side in WANTED:
+        if not len(others):
+            break
+        # A distance off by a factor e counts as much as a turn of half a radian or a step ahead.
+        cost = (np.abs(np.log(length / (share * median_depth))) + 2 * turn +
+                0.5 * np.abs(unit[:, 2]))
+        if direction is not None:
+            cost -= 0.6 * side * (unit @ direction)
+        cost[np.isin(others, chosen)] = np.inf
+        best = int(cost.argmin())
+        if not np.isfinite(cost[best]):
+            break
+        chosen.append(int(others[best]))
+        direction = unit[best] if direction is None else direction
+    return chosen
+
+
+def depth_of(flight, index, pictures):
+    """The DepthMap of a keyframe; None where nothing shows its scene from elsewhere."""
+    found = flight.depth_range(index)
+    partners = choose_partners(flight, index, found[1]) if found else []
+    if not partners:
+        return None
+    views = [index] + partners
+    return tv.sweep_depth([pictures(i) for i in views], [flight.camera] * len(views),
+                          flight.R[views], flight.centres[views], near_depth=found[0],
+                          far_depth=found[2])
+
+
+def make(flight, settings=Settings()):
+    """The Model of a Flight."""
+    def pictures(i):
+        return cv2.imread(f"{flight.folder}/{flight.names[i]}", cv2.IMREAD_GRAYSCALE)
+
+    room = tv.Room(settings.memory_mib << 20, voxel=settings.voxel)
+    keyframes, spent_depth, spent_fusion = [], 0.0, 0.0
+
+    def add(pose, *arrays, **keywords):
+        while True:
+            try:
+                room.add(*pose, *arrays, **keywords)
+                return
+            except tv.TV_ERR_CAPACITY:
+                room.coarsen()
+
+    for index in flight.keyframes:
+        begin = time.process_time()
+        found = depth_of(flight, index, pictures)
+        spent_depth += time.process_time() - begin
+        if found is None:
+            continue
+        begin = time.process_time()
+        measured = np.where(found.witnesses >= LEAST_WITNESSES, found.distance, 0)
+        arrays = (measured, found.sigma, found.witnesses, found.grey)
+        pose = (found.camera, flight.R[index], flight.centres[index])
+        add(pose, *arrays)
+        spent_fusion += time.process_time() - begin
+        keyframes.append((index, pose, arrays))
+    begin = time.process_time()
+    for _, pose, arrays in keyframes:
+        try:
+            room.see_through(*pose, *arrays)
+        except tv.TV_ERR_ARGUMENT:
+            pass  # fixed by a coarser voxel
+    planes = np.zeros(0)
+    if not settings.measured_only:
+        planes = room.find_planes()
+        inferred = [(pose, room.infer(planes, *pose, *arrays)) for _, pose, arrays in keyframes]
+        for pose, (distance, sigma) in inferred:
+            if distance.any():
+                add(pose, distance, sigma, inferred=True)
+    mesh = room.mesh(measured_only=settings.measured_only, min_maps=settings.min_maps)
+    spent_mesh = time.process_time() - begin
+    num = max(len(keyframes), 1)
+    model = Model(mesh.vertices, mesh.triangles, planes, room.state.voxel, keyframes,
+                  1e3 * spent_depth / num, 1e3 * spent_fusion / num, 1e3 * spent_mesh)
+    room.close()
+    return model
