@@ -27,10 +27,11 @@ def numbers(*values):
 
 
 def mov(pictures, times_s, turn=QUARTERS[0], pixel_aspect=(1, 1), start_s=0.0, timescale=90000,
-        last_s=None, sound_only=False):
+        last_s=None, sound_only=False, index_first=False):
     """pictures: PNG files in the order in which they are stored; times_s: when each is shown, in
     any order (composition offsets then say so). start_s: an empty edit before the first picture.
-    last_s: how long the last one is shown."""
+    last_s: how long the last one is shown. index_first: the index stands before the pictures, so
+    that the beginning of the file is a film."""
     width, height = png_size(pictures[0])
     times = [round(t * timescale) for t in times_s]
     shown = sorted(times)
@@ -45,9 +46,8 @@ def mov(pictures, times_s, turn=QUARTERS[0], pixel_aspect=(1, 1), start_s=0.0, t
         edits.insert(0, (round(start_s * timescale), -1))
     sizes = [len(data) for data in pictures]
     head = atom(b"ftyp", b"qt  ", numbers(0), b"qt  ")
-    first = len(head) + 8
 
-    def media():
+    def media(first):
         entry = atom(b"png ", bytes(6), struct.pack(">H", 1), bytes(16),
                      struct.pack(">HH", width, height), numbers(72 << 16, 72 << 16, 0),
                      struct.pack(">H", 1), bytes(32), struct.pack(">Hh", 24, -1),
@@ -72,13 +72,17 @@ def mov(pictures, times_s, turn=QUARTERS[0], pixel_aspect=(1, 1), start_s=0.0, t
                  atom(b"dinf", full(b"dref", numbers(1), atom(b"url ", numbers(1)))), table))
 
     whole = sum(length for length, _ in edits)
-    track = atom(
-        b"trak",
+    heading = (
         atom(b"tkhd", numbers(3), numbers(0, 0, 1, 0, whole), bytes(8), bytes(8), matrix(*turn),
              numbers(width << 16, height << 16)),
         atom(b"edts", full(b"elst", numbers(len(edits)), *(
-            struct.pack(">IiI", length, at, 1 << 16) for length, at in edits))),
-        media())
+            struct.pack(">IiI", length, at, 1 << 16) for length, at in edits))))
     movie = full(b"mvhd", numbers(0, 0, timescale, whole, 1 << 16), struct.pack(">H", 1 << 8),
                  bytes(10), matrix(1, 0, 0, 1), bytes(24), numbers(2))
-    return head + atom(b"mdat", *pictures) + atom(b"moov", movie, track)
+
+    def index(first):
+        return atom(b"moov", movie, atom(b"trak", *heading, media(first)))
+
+    if index_first:
+        return head + index(len(head) + len(index(0)) + 8) + atom(b"mdat", *pictures)
+    return head + atom(b"mdat", *pictures) + index(len(head) + 8)

@@ -140,16 +140,15 @@ class Films(CliTest):
             self.assertAlmostEqual(result["truth"]["ate_rmse"], runs[0]["truth"]["ate_rmse"], 6)
         self.assertIn("the camera, of square pixels, was scaled", runs[1]["notes"][0])
 
-    def test_a_film_that_ends_early_is_tracked_as_far_as_it_goes(self):
-        whole = mov(PICTURES, [i / 5 for i in range(COUNT)])
-        cut = whole[:sum(map(len, PICTURES)) * 2 // 3] + bytes(
-            len(whole) - sum(map(len, PICTURES)) * 2 // 3)
-        # The index at the end stays, the pictures of the last third are gone.
-        at = whole.index(b"moov") - 4
-        film = cut[:at] + whole[at:]
-        result = self.track(film, truth=truth_at([i / 5 for i in range(COUNT)]))
-        self.assertLess(result["num_frames"] - result["num_unreadable"], COUNT)
-        self.assertTrue(result["notes"])
+    def test_a_film_that_is_cut_off_is_tracked_as_far_as_it_goes(self):
+        times = [i / 5 for i in range(COUNT)]
+        whole = mov(PICTURES, times, index_first=True)
+        result = self.track(whole, truth=truth_at(times))
+        self.assert_right(result)
+        self.assertEqual(result["notes"], [])
+        result = self.track(whole[:-sum(map(len, PICTURES[-8:])) - 100], truth=truth_at(times))
+        self.assertEqual(result["truth"]["num_compared"], COUNT - 9)
+        self.assertIn("s before its header says: it may be cut off", " ".join(result["notes"]))
 
     def test_what_is_no_film_with_pictures_is_named(self):
         sound = self.write("sound.mov", mov([PICTURES[0]], [0], sound_only=True))

@@ -71,7 +71,7 @@ class Truths(CliTest):
     def test_what_is_no_truth_is_named(self):
         for words, text in (
                 (("line 1", "7 numbers", "angles"), "0 1 2 3 0 0 90\n"),
-                (("line 1", "none is qw", "roll"), "time,x,y,z,roll,pitch,yaw\n0,0,0,0,0,0,0\n"),
+                (("line 1", "none is qx", "roll"), "time,x,y,z,roll,pitch,yaw\n0,0,0,0,0,0,0\n"),
                 (("line 2", "length 90"), "0 0 0 0 0 0 0 1\n1 0 0 0 0 0 90 0\n"),
                 (("line 1", "no rotation"), "2 0 0 0 0 2 0 0 0 0 2 0\n")):
             self.assert_refused(self.run_with(text), "truth.csv", *words)
