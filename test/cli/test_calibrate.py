@@ -351,7 +351,7 @@ class Views(CalibrateTest):
 
     def test_images_that_cannot_be_read_or_are_of_another_size_are_left_out(self):
         small = self.save("small.png", cv2.resize(self.images[0], (320, 240)))
-        cut = self.write("cut.png", Path(self.names[0]).read_bytes()[:5000])
+        cut = self.write("cut.png", (self.folder / self.names[0]).read_bytes()[:5000])
         hidden = self.write("._0.png", b"\0\5\x16\7")
         given = (small, *self.names, cut, hidden)
         done = self.succeed(self.calibrate(*given))
@@ -365,8 +365,9 @@ class Views(CalibrateTest):
                          ["other_size", "unreadable", "unreadable"])
         alone = self.calibrated(*self.names)
         self.assertEqual(result["intrinsics"], alone["intrinsics"])
-        self.refuse(cut, hidden, words=["cut.png is truncated"])
-        self.refuse(*self.names, "absent.png", words=["absent.png", "No such file"])
+        none = self.folder / "none"
+        self.refuse(cut, hidden, words=["cut.png is truncated"], out=none)
+        self.refuse(*self.names, "absent.png", words=["absent.png", "No such file"], out=none)
 
     def test_one_view_only(self):
         self.refuse(self.names[0], words=["only 1 different view", "in 1 image:", "at least 3"])

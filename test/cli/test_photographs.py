@@ -342,9 +342,10 @@ class Sizes(cli.CliTest):
         self.assertNotIn(b"note  ", done.stdout)
         self.assertEqual(self.result()["image_size0"], [2560, 1920])
         for verb, images in (("detect", [self.a]), ("match", [self.a, self.b])):
-            done = self.succeed(self.run_program(verb, *images, "-o", self.out))
+            out = self.folder / verb
+            done = self.succeed(self.run_program(verb, *images, "-o", out))
             self.assertRegex(done.stdout, rb"\Anote .*\n[0-9]+ (keypoints|matches)")
-            done = self.succeed(self.run_program(verb, *images, "-o", self.out, "--json"))
+            done = self.succeed(self.run_program(verb, *images, "-o", out, "--json"))
             self.one_line(done, "2560x1920 at 1600x1200")
             self.assertEqual(json.loads(done.stdout)["options"]["resize"], 1600)
 
@@ -483,7 +484,7 @@ class Formats(cli.CliTest):
             picture = png(WIDTH, HEIGHT, data)
             self.write(f"photos/{k}.png", with_exif(picture, exif(**film(FOCAL_35MM))))
         done = self.run_program("odometry", "photos", "--fps", "10", "-o", self.out)
-        self.assertIn(b"note: focal length 32 mm (35 mm equivalent) from EXIF", done.stderr)
+        self.assertIn(b"note         focal length 32 mm (35 mm equivalent) from EXIF", done.stdout)
         result = json.loads((self.out / "result.json").read_text())
         self.assertIsNone(result["focal_length"])
 

@@ -104,11 +104,12 @@ class Triangulate(cli.CliTest):
         self.assertIn(b"element vertex 2\n", (self.out / "cloud.ply").read_bytes())
 
     def test_match_and_reconstruct_give_what_it_reads(self):
-        self.succeed(self.run_program("match", self.a, self.b, "-o", self.out))
+        matches = self.folder / "matches"
+        self.succeed(self.run_program("match", self.a, self.b, "-o", matches))
         self.succeed(self.reconstruct())
         self.pose = self.out / "result.json"
         cloud = self.folder / "new" / "cloud.ply"
-        done = self.succeed(self.triangulate("--json", matches=self.out / "matches.csv", out=cloud))
+        done = self.succeed(self.triangulate("--json", matches=matches / "matches.csv", out=cloud))
         self.assertEqual(self.listing(cloud.parent), ["cloud.ply"])
         points = [
             p

@@ -25,9 +25,9 @@ int detect(Arguments& a) {
   add_picture_mask(picture.name, picture, common);
   bring_to_size(picture, common);
   OutputSet files(common.output);
-  files.require_own({"detect", {"keypoints.csv", "keypoints.png"}, {"keypoints.csv"}, {}});
   files.keep(a.image);
   for (const std::string& mask : common.options.masks.files()) files.keep(mask);
+  files.require_own({"detect", {"keypoints.csv", "keypoints.png"}, {"keypoints.csv"}, {}});
   Session session(common.options);
   tv_context* context = session.context(picture.luma.cols, picture.luma.rows);
   auto watch = std::make_unique<Stopwatch>(!common.quiet, watch_text(common.options));

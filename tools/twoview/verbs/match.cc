@@ -50,9 +50,9 @@ int match(Arguments& a) {
     bring_to_size(picture[i], common);
   }
   OutputSet files(common.output);
-  files.require_own({"match", {"matches.csv", "matches.png"}, {"matches.csv", "matches.png"}, {}});
   for (const std::string& image : a.image) files.keep(image);
   for (const std::string& mask : common.options.masks.files()) files.keep(mask);
+  files.require_own({"match", {"matches.csv", "matches.png"}, {"matches.csv", "matches.png"}, {}});
   Session session(common.options);
   tv_context* context = session.context(std::max(picture[0].luma.cols, picture[1].luma.cols),
                                         std::max(picture[0].luma.rows, picture[1].luma.rows));
