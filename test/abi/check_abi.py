@@ -78,8 +78,8 @@ CHANGES = [
     (
         "a field at the end of a growing struct",
         "two_view.h",
-        "double focal_sigma;",
-        "double focal_sigma;\n  double more;",
+        "double camera_direction_rad;",
+        "double camera_direction_rad;\n  double more;",
         False,
     ),
 ]

@@ -1,7 +1,8 @@
 /* twoview: the geometry of two views from matched pixels.
 
    Formulas, papers, the rules of the verdict, and tests: docs/algorithms/two_view.md,
-   docs/algorithms/gravity.md, docs/algorithms/principal_point.md, docs/algorithms/covariance.md. */
+   docs/algorithms/gravity.md, docs/algorithms/principal_point.md, docs/algorithms/camera_misfit.md,
+   docs/algorithms/covariance.md. */
 #ifndef TWOVIEW_TWO_VIEW_H
 #define TWOVIEW_TWO_VIEW_H
 
@@ -316,12 +317,13 @@ typedef struct tv_two_view {
      where it was not tested: where there is no pose, or it was fitted together with a plane that
      explains nearly all matches. Above 26.1 (22.5 where camera0 and camera1 differ) the cameras
      count as contradicted: chi-square with eight (six) degrees of freedom exceeds it in one of a
-     thousand cases, and matches count as a quarter as many, since they share errors. The next two
-     fields are the angles in radians by which the rotation and the direction (of t or of the
-     inverse pose's, whichever moves more) would move with cameras that the matches do not
-     contradict; 0 where they do not contradict the given ones. The covariance contains them. */
+     thousand cases, and matches count as a quarter as many, since they share errors. */
   double camera_chi2;
-  double camera_turn_rad, camera_direction_rad;
+  /* The angle in radians by which the rotation would move with cameras that the matches do not
+     contradict; 0 where they do not contradict the given ones. The covariance contains it. */
+  double camera_turn_rad;
+  /* The same of the direction (of t or of the inverse pose's, whichever moves more). */
+  double camera_direction_rad;
 } tv_two_view;
 
 /* Writes zeros into a struct of struct_size bytes, and the size; null is allowed. Programs call

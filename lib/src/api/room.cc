@@ -1,6 +1,7 @@
 // The entry points of the room: they validate, and call the stages of lib/src/room.
 #include "twoview/room.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "api/sized.h"
@@ -102,7 +103,7 @@ tv_status read_plane_request(const tv_room& room, const tv_room_plane_options* g
               {0, 0, 0},
               o.gravity_sigma_rad};
   double length = 0;
-  for (const double g : o.gravity) length = std::fmax(length, std::fabs(g));
+  for (const double g : o.gravity) length = std::max(length, std::fabs(g));
   if (length > 0) {
     double sum = 0;
     for (int i = 0; i < 3; ++i) {

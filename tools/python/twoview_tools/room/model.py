@@ -37,7 +37,8 @@ class Model:
 
 
 def choose_partners(flight, index, median_depth):
-    """The frames that show the keyframe's scene from a fitting distance, in different directions."""
+    """The frames that show the keyframe's scene from a fitting distance, in different
+    directions."""
     first = max(0, index - NEIGHBOURS)
     others = np.array([i for i in range(first, min(len(flight.names), index + NEIGHBOURS + 1))
                        if i != index])
