@@ -380,6 +380,7 @@ class OdometryTest(CliTest):
         self.assertEqual(result["options"]["focal_35mm"], "auto")
         self.assertEqual(result["focal_length"]["source"], "estimated")
         camera = self.write("camera.yaml", camera_yaml())
+        self.out = self.folder / "refused"
         self.assert_refused(self.odometry(source, "--focal-35mm", "auto", "--camera", camera),
                             "without a camera file")
         self.assert_refused(self.odometry("0", "--focal-35mm", "auto"), "a live one")
@@ -744,7 +745,8 @@ distortion_coefficients: [0, 0, 0, 0]
 
     def test_many_frames_of_a_blank_wall_take_no_memory_each(self):
         self.write("set/images/wall.png", png(48, 40, bytes([90]) * 48 * 40))
-        self.write("set/cameras.yaml", CAMERAS.replace(str(WIDTH), "48").replace(str(HEIGHT), "40"))
+        self.write("set/cameras.yaml", CAMERAS.replace(str(WIDTH), "48").replace(str(HEIGHT), "40")
+                   .replace(str((WIDTH - 1) / 2), "23.5").replace(str((HEIGHT - 1) / 2), "19.5"))
         peaks = []
         for count in (200, 4000):
             self.write("set/frames.txt", "".join(f"{i} images/wall.png\n" for i in range(count)))

@@ -237,6 +237,7 @@ class Exif(cli.CliTest):
                  "sensor", "--focal-35mm"]
         done = self.reconstruct(a=image, b=image, camera=False)
         self.assertIn(words[0].encode(), b" ".join(done.stdout.split()))
+        self.out = self.folder / "refused"
         pose = self.write("pose.yaml", "R: [1,0,0, 0,1,0, 0,0,1]\nt: [-1, 0, 0]\n")
         done = self.run_program("triangulate", self.write("m.txt", "8 8 7 8\n"), "--pose", pose,
                                 "--images", image, image, "-o", self.out)
@@ -302,7 +303,9 @@ class Exif(cli.CliTest):
             with self.subTest(case=case):
                 a, b = (self.write(f"{p.name}", with_exif(p.read_bytes(), data))
                         for p in (self.a, self.b))
-                self.assert_refused(self.reconstruct(a=a, b=b, camera=False), "no focal length")
+                self.succeed(self.reconstruct(a=a, b=b, camera=False))
+                self.assertEqual(json.loads(
+                    (self.out / "result.json").read_text())["focal_length"]["source"], "estimated")
 
     def test_a_jpegs_is_read_and_serves_triangulate(self):
         image = self.write("p.jpg", with_exif(JPEG, exif(**film(50))))

@@ -136,7 +136,7 @@ class PrincipalPoint(cli.CliTest):
         done = self.succeed(
             self.run_program(
                 "triangulate",
-                self.out / "matches.csv",
+                self.folder / "matches" / "matches.csv",
                 "--camera",
                 self.camera,
                 "--pose",
@@ -146,7 +146,7 @@ class PrincipalPoint(cli.CliTest):
                 out,
             )
         )
-        with open(self.out / "matches.csv", newline="") as file:
+        with open(self.folder / "matches" / "matches.csv", newline="") as file:
             rows = list(csv.DictReader(file))
         matches = [tuple(float(row[key]) for key in ("x0", "y0", "x1", "y1")) for row in rows]
         points = json.loads(done.stdout)["points"]
@@ -155,7 +155,7 @@ class PrincipalPoint(cli.CliTest):
 
     def test_triangulate_takes_the_camera_that_the_pose_is_of(self):
         # `match` writes the keypoints as they were found, without alignment.
-        self.succeed(self.run_program("match", self.a, self.b, "-o", self.out))
+        self.succeed(self.run_program("match", self.a, self.b, "-o", self.folder / "matches"))
         self.succeed(self.moving("--align-matches", "0"))
         result = self.result()
         R, t, shift = result["R"], result["t"], result["principal_point_shift_px"]
@@ -169,7 +169,7 @@ class PrincipalPoint(cli.CliTest):
         self.assertLess(len(told & rounded(without)), 0.1 * len(told))
 
     def test_a_pose_of_smaller_images_moves_a_whole_camera_by_as_much_more(self):
-        self.succeed(self.run_program("match", self.a, self.b, "-o", self.out))
+        self.succeed(self.run_program("match", self.a, self.b, "-o", self.folder / "matches"))
         self.succeed(self.moving("--resize", "800"))
         result = self.result()
         shift = [1241 / 800 * v for v in result["principal_point_shift_px"]]

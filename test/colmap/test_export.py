@@ -18,7 +18,7 @@ import twoview as tv
 from twoview_tools.colmap import exporter, schema38, settings
 from twoview_tools.colmap.database import appended_database
 from twoview_tools.colmap.errors import BadInput
-from conftest import CAMERA, HEIGHT, NAMES, WIDTH, run, start
+from conftest import CAMERA, CX, CY, HEIGHT, NAMES, WIDTH, run, start
 
 pycolmap = pytest.importorskip("pycolmap")
 SCHEMAS = ("4", "3.8")
@@ -249,6 +249,7 @@ def test_images_that_show_different_things_are_degenerate(tmp_path, schema, call
         cv2.imwrite(str(tmp_path / "images" / f"{seed}.png"), cv2.GaussianBlur(noise, (0, 0), 1.5))
     (tmp_path / "cameras.yaml").write_text(
         CAMERA.replace(str(WIDTH), "160").replace(str(HEIGHT), "120")
+        .replace(str(CX), "79.5").replace(str(CY), "59.5")
     )
     status, _, err = call(
         "export",

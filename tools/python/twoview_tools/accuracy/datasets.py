@@ -84,8 +84,12 @@ def read_cameras(set_dir):
 
 
 def distortion_of(camera):
-    """The distortion coefficients k1 k2 p1 p2 k3 of a formats.Camera; zeros if there is none."""
-    return (list(camera.k) if camera else []) or [0.0] * 5
+    """The distortion coefficients k1 k2 p1 p2 k3 of a formats.Camera; zeros if there is none.
+    ValueError for a lens that has more."""
+    k = list(camera.k) if camera else []
+    if any(k[5:]):
+        raise ValueError("a lens of more than five coefficients is not for these sets")
+    return (k + [0.0] * 5)[:5]
 
 
 def resized_shape(width, height, resize):
