@@ -15,7 +15,7 @@ import numpy as np
 from twoview_tools import formats
 from twoview_tools.accuracy import datasets
 from twoview_tools.odometry import (cli, copies, endurance, evaluate, faults, flights, mapper,
-                                    poses, sensors, set_writer, sets, surfaces, targets)
+                                    poses, runs, sensors, set_writer, sets, surfaces, targets)
 
 LIBRARY = os.environ.get("TWOVIEW_LIBRARY", "")
 BUILT = os.path.join(os.path.dirname(os.path.dirname(LIBRARY)), "bin", "twoview_flights")

@@ -161,11 +161,6 @@ void add_camera_misfit(const PoseRefiner& f, int count, const Pose& pose, const 
   }
   misfit->chi2 = evidence * stretch / variance;
   if (!(misfit->chi2 > (has_centre ? kCameraEvidence : kTurnsEvidence))) return;
-  // What the matches leave open of the turns is of the size of what they show of them, and at most
-  // that of the prior: a lens that is bent by a hundredth of a pixel opens nothing.
-  double turns_sq = 0;
-  for (int q = 0; q < kTurns; ++q) turns_sq += asked[q] * asked[q];
-  const double share = std::min(1.0, turns_sq / (turn_sigma * turn_sigma));
   double step[kPose], of_step[25], grown[25];
   for (int r = 0; r < kPose; ++r) {
     step[r] = 0;
@@ -176,8 +171,7 @@ void add_camera_misfit(const PoseRefiner& f, int count, const Pose& pose, const 
       of_step[kPose * r + c] = step[r] * step[c];
       double open = 0;
       for (int q = 0; q < num * num; ++q) open += G[r][q / num] * left_open[q] * G[c][q % num];
-      grown[kPose * r + c] =
-          covariance[kPose * r + c] + of_step[kPose * r + c] + share * variance * open;
+      grown[kPose * r + c] = covariance[kPose * r + c] + of_step[kPose * r + c] + variance * open;
     }
   }
   if (!all_finite(grown, 25)) return;
