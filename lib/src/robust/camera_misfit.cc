@@ -117,6 +117,8 @@ void sum_equations(const PoseRefiner& f, int count, const Pose& pose, const Robu
 void add_camera_misfit(const PoseRefiner& f, int count, const Pose& pose, const RobustLoss& loss,
                        CameraMisfit* misfit, double covariance[25]) {
   *misfit = CameraMisfit{};
+  misfit->given_turn_sigma_rad =
+      std::sqrt(std::max(std::max(covariance[0], covariance[6]), covariance[12]));
   const double turn_sigma = f.problem.options.readout_turn_sigma_rad;
   if (!(turn_sigma > 0) || count <= 2 * kAll) return;
   // Another principal point of one of two cameras is nearly a rotation of that view.

@@ -78,10 +78,11 @@ double distance_from_arc(const Motion& motion, const double* pixel0, const doubl
 }
 
 // The largest standard deviation of the rotation about an axis, in radians; negative where it is
-// not known.
+// not known. What a misfit of the camera adds to it is no noise of this pair's matches.
 double turn_sigma(const TwoViewOutcome& outcome) {
   if (!outcome.has_t) return 0;  // that of a rotation alone is far below a pixel
   if (!outcome.has_covariance) return -1;
+  if (outcome.misfit.given_turn_sigma_rad > 0) return outcome.misfit.given_turn_sigma_rad;
   const double* c = outcome.covariance;
   return std::sqrt(std::max(std::max(c[0], c[6]), c[12]));
 }
