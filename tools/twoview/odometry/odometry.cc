@@ -299,7 +299,8 @@ std::string summary(const FlightResult& result, const std::optional<FilmLens>& l
   if (lens) {
     text += summary_line("camera", "%s, estimated from the film", lens->words().c_str());
     if (lens->is_uncertain) {
-      text += summary_line("doubtful", "the focal length is doubtful: do not fly by this path");
+      text +=
+          summary_line("doubtful", "%s", "the focal length is doubtful: do not fly by this path");
       text += summary_line("advice", "%s", kDoubtfulFocalAdvice);
     }
   }
