@@ -287,6 +287,65 @@ def test_append_adds_what_is_not_there(exported, photographs, tmp_path, schema, 
     assert_nothing_else(tmp_path, "x.db", "pairs.txt")
 
 
+@pytest.mark.parametrize("change", [
+    "",  # made of 3.8's by COLMAP 4: its new columns stand at the end, and the old ones stay
+    "ALTER TABLE two_view_geometries DROP COLUMN camera1;"  # as COLMAP 4.0 made it
+    "ALTER TABLE two_view_geometries DROP COLUMN camera2; PRAGMA user_version = 4000400;",
+    "ALTER TABLE images ADD COLUMN note TEXT;",
+])
+def test_append_takes_what_colmap_brought_over(exported, photographs, tmp_path, change, call):
+    pycolmap = pytest.importorskip("pycolmap")
+    path = shutil.copy(exported["3.8"], tmp_path / "x.db")
+    pycolmap.Database.open(path).close()
+    with contextlib.closing(sqlite3.connect(path)) as database:
+        if sqlite3.sqlite_version_info < (3, 35) and "DROP" in change:
+            pytest.skip("SQLite without DROP COLUMN")
+        database.executescript(change)
+    arguments = ("export", "--database", path, "--images", photographs / "images", "--append")
+    status, out, err = call(*arguments)
+    assert status == 0 and "4 images (0 new), 0 pairs (none new)" in out, err
+    with pycolmap.Database.open(path) as database:
+        assert len(database.read_all_images()) == 4 == len(database.read_all_frames())
+
+
+def test_the_mapper_takes_what_was_appended_to_a_migrated_database(photographs, tmp_path, call):
+    """Images of before, which COLMAP gives no frame, beside one that was added with a frame."""
+    pycolmap = pytest.importorskip("pycolmap")
+    (tmp_path / "three.txt").write_text("a.png b.png\na.png c.png\nb.png c.png\n")
+    arguments = ("export", "--database", tmp_path / "x.db", "--images", photographs / "images")
+    assert call(*arguments, "--pairs", tmp_path / "three.txt", "--schema", "3.8")[0] == 0
+    pycolmap.Database.open(tmp_path / "x.db").close()
+    status, out, err = call(*arguments, "--append")
+    assert status == 0 and "4 images (1 new), 3 pairs" in out, err
+    (tmp_path / "models").mkdir()
+    models = pycolmap.incremental_mapping(tmp_path / "x.db", photographs / "images",
+                                          tmp_path / "models")
+    assert models[0].num_reg_images() == 4
+
+
+@pytest.mark.parametrize("change, words", [
+    ("CREATE TABLE other (x INTEGER)", "another table other"),
+    ("ALTER TABLE images ADD COLUMN kind INTEGER NOT NULL DEFAULT 3", ""),
+    ("CREATE TABLE new (image_id INTEGER PRIMARY KEY, name TEXT, camera_id INTEGER, "
+     "kind TEXT NOT NULL); DROP TABLE images; ALTER TABLE new RENAME TO images",
+     "a column kind in images that must be filled"),
+    ("ALTER TABLE keypoints RENAME COLUMN data TO d", "does not open it"),
+])
+def test_append_names_the_table_that_differs(exported, photographs, tmp_path, change, words, refuse,
+                                             call):
+    path = shutil.copy(exported["4"], tmp_path / "x.db")
+    with contextlib.closing(sqlite3.connect(path)) as database:
+        database.execute("PRAGMA legacy_alter_table = ON")
+        database.executescript(change)
+    before = digest(path)
+    arguments = ("export", "--database", path, "--images", photographs / "images", "--append")
+    if not words:
+        assert call(*arguments)[0] == 0
+        return
+    refuse(words, *arguments)
+    assert digest(path) == before
+
+
 def test_append_refuses_what_contradicts(exported, photographs, tmp_path, refuse):
     path = shutil.copy(exported["3.8"], tmp_path / "x.db")
     before = digest(path)
@@ -384,6 +443,8 @@ def test_another_versions_database_is_refused(exported, photographs, tmp_path, r
             *arguments,
         )
         assert digest(path) == before
+    refuse("COLMAP 4 brings it over", "export", "--database",
+           shutil.copy(exported["3.8"], tmp_path / "x.db"), *arguments)
     (tmp_path / "x.db").write_bytes(b"nothing that SQLite knows" * 100)
     refuse("x.db: not a database", "export", "--database", tmp_path / "x.db", *arguments)
     (tmp_path / "x.db").write_bytes(b"")

@@ -273,6 +273,157 @@ def test_without_matches_ours_are_made(tmp_path, call):
     assert status == 0 and json.loads(out)["pairs"][0]["num_inliers"] == 80
 
 
+ALIKED = "ALIKED_N16ROT"
+
+
+@pytest.mark.parametrize("kind, columns, values, words", [
+    (1, 512, "floats", ALIKED),
+    (1, 128, "floats", ALIKED),  # 32 floats are 128 bytes, as SIFT's
+    (4, 128, "sift", "LOMA_B128"),
+    (99, 128, "sift", "features of type 99"),
+    (0, 128, "floats", "their length is"),  # COLMAP 4 calls all descriptors of 3.8 SIFT's
+    (None, 128, "floats", "their length is"),
+    (None, 256, "floats", "256 bytes each, not 128"),
+    (0, 64, "sift", "64 bytes each, not 128"),
+    (0, 128, "none", "there are no descriptors"),
+    (0, 128, "fewer", "80 keypoints and 79 descriptors"),
+])
+def test_descriptors_of_other_features_need_matches(tmp_path, kind, columns, values, words, refuse,
+                                                    call):
+    import sqlite3
+    path = tmp_path / "x.db"
+    write_database(path, views_of(scene_points(80)), with_matches=False,
+                   descriptors=sift_like(80))
+    random = np.random.default_rng(3)
+    rows = random.standard_normal((80, columns // 4)).astype(np.float32)
+    rows /= np.linalg.norm(rows, axis=1, keepdims=True)
+    rows = sift_like(80)[:, :columns] if values != "floats" else rows
+    rows = {"none": rows[:0], "fewer": rows[:79]}.get(values, rows)
+    with contextlib.closing(sqlite3.connect(path)) as database:
+        database.execute("UPDATE descriptors SET type = ?, rows = ?, cols = ?, data = ?",
+                         (kind or 0, len(rows), columns, rows.tobytes()))
+        if kind is None:  # a database of COLMAP 3 does not say it
+            database.execute("ALTER TABLE descriptors DROP COLUMN type")
+        database.commit()
+    arguments = ("import", "--database", path, "-o", tmp_path / "out")
+    refuse((words, "matches are needed"), *arguments)
+    assert not (tmp_path / "out").exists()
+    # With matches the descriptors are not needed, whatever they are.
+    both = np.repeat(np.arange(80, dtype=np.uint32)[:, None], 2, axis=1)
+    with contextlib.closing(sqlite3.connect(path)) as database:
+        database.execute("INSERT INTO matches VALUES (?, 80, 2, ?)",
+                         (2147483647 + 2, both.tobytes()))
+        database.commit()
+    [pair] = json.loads(call(*arguments, "--json")[1])["pairs"]
+    assert pair["num_inliers"] == 80 and pair["matches_from"] == "matches"
+
+
+def sift_like(count):
+    rows = np.random.default_rng(1).exponential(1, (count, 128))
+    return np.rint(rows / np.linalg.norm(rows, axis=1, keepdims=True) * 512).clip(0, 255).astype(
+        np.uint8)
+
+
+def test_pairs_without_matches_beside_pairs_with_them(exported, tmp_path, call):
+    import sqlite3
+    path = shutil.copy(exported["4"], tmp_path / "x.db")
+    with contextlib.closing(sqlite3.connect(path)) as database:
+        for table in ("matches", "two_view_geometries"):
+            database.execute(f"DELETE FROM {table} WHERE pair_id != 2147483647 + 2")
+        database.execute("UPDATE descriptors SET type = 2")
+        database.commit()
+    status, out, err = call("import", "--database", path, "-o", tmp_path / "out", "--sequential",
+                            "1")
+    assert status == 0, err
+    assert "; 2 pairs have no matches: the descriptors are not SIFT's (ALIKED_N32)" in out
+    report = json.loads((tmp_path / "out" / "report.json").read_text())
+    assert [pair["matches_from"] for pair in report["pairs"]] == ["matches", None, None]
+
+
+@pytest.mark.parametrize("matches", ["no row", "a row of none", "as they were"])
+def test_verified_geometries_alone_are_used(exported, models, tmp_path, matches, call, refuse):
+    """As pipelines write them that verify their own matches; a pair of a watermark is none."""
+    import sqlite3
+    path = shutil.copy(exported["4"], tmp_path / "x.db")
+    with contextlib.closing(sqlite3.connect(path)) as database:
+        if matches == "no row":
+            database.execute("DELETE FROM matches")
+        elif matches == "a row of none":
+            database.execute("UPDATE matches SET rows = 0, data = NULL")
+        database.execute("UPDATE two_view_geometries SET F = NULL, E = NULL, H = NULL, qvec = NULL, "
+                         "tvec = NULL, config = 9 WHERE pair_id = 2147483647 + 2")
+        database.execute("UPDATE two_view_geometries SET config = 7 "
+                         "WHERE pair_id = 2147483647 + 3")
+        database.execute("UPDATE descriptors SET type = 1")
+        database.commit()
+    arguments = ("import", "--database", path, "--model", models["text"], "-o", tmp_path / "out")
+    status, out, err = call(*arguments)
+    assert status == 0, err
+    report = json.loads((tmp_path / "out" / "report.json").read_text())
+    used = {(row["name0"], row["name1"]): row for row in report["pairs"]}
+    origin = "matches" if matches == "as they were" else "two_view_geometries"
+    assert used["a.png", "b.png"]["matches_from"] == origin
+    assert used["a.png", "b.png"]["rotation_error_deg"] < 0.3
+    assert ("5 pairs are those that COLMAP has verified already" in out) == (matches != "as they were")
+    watermark = used.get(("a.png", "c.png"))
+    assert (watermark is None if matches == "no row" else
+            watermark["num_matches"] == 0 if matches == "a row of none" else
+            watermark["num_inliers"] > 25)
+    with contextlib.closing(sqlite3.connect(path)) as database:
+        database.execute("UPDATE keypoints SET rows = 0, data = NULL WHERE image_id = 2")
+        database.commit()
+    refuse("a match of a.png and b.png has no keypoint", *arguments)
+
+
+BLANKS = {"a.png": "my a.png", "b.png": "my b.png", "c.png": "sub folder/c d.png", "d.png": "e\tf.png"}
+
+
+@pytest.mark.parametrize("form, newline", [("text", "\n"), ("text", "\r\n"), ("binary", "\n")])
+def test_names_with_blanks_are_whole_or_named(exported, models, tmp_path, form, newline, call,
+                                              refuse):
+    import sqlite3
+    folder = shutil.copytree(models["text"], tmp_path / "model")
+    lines = (folder / "images.txt").read_text().split("\n")
+    lines = [" ".join([*line.split()[:9], BLANKS[line.split()[9]]])
+             if line.endswith(".png") else line for line in lines]
+    lines.insert(4, "# a comment")
+    (folder / "images.txt").write_text("\n".join(lines), newline=newline)
+    assert set(read_model(folder).images) == set(BLANKS.values())
+    if form == "binary":
+        found = pycolmap.Reconstruction(models["text"])
+        for image in found.images.values():
+            image.name = BLANKS[image.name]
+        folder = tmp_path / "binary"
+        folder.mkdir()
+        found.write_binary(folder)
+    refuse("a blank in its name", "import", "--model", folder, "-o", tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+    # A database's report can hold them, and finds their truth.
+    path = shutil.copy(exported["4"], tmp_path / "x.db")
+    with contextlib.closing(sqlite3.connect(path)) as database:
+        for name, other in BLANKS.items():
+            database.execute("UPDATE images SET name = ? WHERE name = ?", (other, name))
+        database.commit()
+    status, out, _ = call("import", "--database", path, "--model", folder, "-o", tmp_path / "out",
+                          "--json")
+    report = json.loads(out)
+    assert status == 0 and len(report["pairs"]) == 6
+    assert all(pair["rotation_error_deg"] < 0.3 for pair in report["pairs"])
+
+
+def test_an_images_line_without_points_is_followed_by_an_empty_one(models, tmp_path, refuse):
+    folder = shutil.copytree(models["text"], tmp_path / "model")
+    lines = (folder / "images.txt").read_text().split("\n")
+    at = next(k for k, line in enumerate(lines) if line.endswith("b.png"))
+    (folder / "points3D.txt").write_text("")
+    lines = [("" if k and lines[k - 1].endswith(".png") else line) for k, line in enumerate(lines)]
+    (folder / "images.txt").write_text("\n".join(lines))
+    assert set(read_model(folder).images) == set(NAMES)
+    lines[at] = lines[at].replace("b.png", "a.png")
+    (folder / "images.txt").write_text("\n".join(lines))
+    refuse("two images are called a.png", "import", "--model", folder, "-o", tmp_path / "out")
+
+
 def test_what_is_no_model_or_no_database(models, tmp_path, refuse):
     refuse("no COLMAP model in it", "import", "--model", tmp_path, "-o", tmp_path / "out")
     broken = shutil.copytree(models["binary"], tmp_path / "broken")

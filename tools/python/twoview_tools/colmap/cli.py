@@ -202,8 +202,17 @@ def _import(arguments):
     areas = ", ".join(f"{area:.1f}" for area in report["auc"].values() if area is not None)
     _say(a, report, f"{a.output}/report.json: {report['num_pairs']} pairs, {posed} with a pose"
                     + (f"; AUC at 5, 10, 20 degrees {areas}" if areas else "")
-                    + _words_on_guessed(report["guessed_focal_lengths"], a))
+                    + _words_on_matches(report) + _words_on_guessed(report["guessed_focal_lengths"], a))
     return EXIT_DONE if posed else EXIT_NO_POSE
+
+
+def _words_on_matches(report):
+    """Continues the summary: how many pairs have verified matches alone, and how many none."""
+    verified = sum(row["matches_from"] == "two_view_geometries" for row in report["pairs"])
+    words = (f"; the matches of {verified} pairs are those that COLMAP has verified already, as the "
+             f"table matches has none" if verified else "")
+    return words + "".join(f"; {count} pairs have no matches: {reason}"
+                           for reason, count in report["without_matches"].items())
 
 
 def _words_on_guessed(names, arguments):
@@ -261,6 +270,10 @@ def _model(arguments):
             f"both images are called {names[0]}, and a COLMAP model tells images apart by their "
             f"names"
         )
+    for name in names:
+        if any(c.isspace() for c in name):
+            raise BadInput(f"image '{name}': COLMAP ends a name of a text model at its first "
+                           f"blank; rename the picture")
     estimate = dataclasses.replace(settings.options_of(a, tv.EstimateOptions),
                                    **settings.sigmas_of(a, sigmas))
     pose, model = reconstruct(a.images, names, cameras, settings.options_of(a, tv.FeatureOptions),

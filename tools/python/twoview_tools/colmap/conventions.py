@@ -19,6 +19,7 @@ _FROM_COLMAP = np.array([[1, 0, -HALF_PIXEL], [0, 1, -HALF_PIXEL], [0, 0, 1]])
 
 # The values of COLMAP's TwoViewGeometry::ConfigurationType.
 DEGENERATE, CALIBRATED, UNCALIBRATED, PLANAR, PANORAMIC, PLANAR_OR_PANORAMIC = 1, 2, 3, 4, 5, 6
+WATERMARK = 7
 # A pair without motion is stored as a panorama with no rotation, so that its matches still join
 # tracks.
 CONFIGURATIONS = {

@@ -5,15 +5,19 @@ import contextlib
 import os
 import sqlite3
 import tempfile
+from dataclasses import dataclass
 
 import numpy as np
 
 from . import schema4, schema38
-from .conventions import MODEL_IDS, ColmapCamera
+from .conventions import MODEL_IDS, WATERMARK, ColmapCamera
 from .errors import BadInput
 
 SCHEMAS = {schema.NAME: schema for schema in (schema4, schema38)}
 _LEFT_BEHIND = ("-wal", "-journal", "-shm")
+# The column `type` of COLMAP 4's descriptors; -1 is "undefined".
+_FEATURE_KINDS = {0: "SIFT", 1: "ALIKED_N16ROT", 2: "ALIKED_N32", 3: "LOMA_B", 4: "LOMA_B128"}
+_NOBODY = "no COLMAP"
 _BUSY, _LOCKED = 5, 6  # SQLite's error codes, which Python's module names from 3.11 on
 
 
@@ -28,10 +32,10 @@ def _columns(database):
 
 
 def maker_of(database):
-    """A description of the COLMAP version that made the database; "no COLMAP" if none did."""
+    """A description of the COLMAP version that made the database; _NOBODY if none did."""
     version = database.execute("PRAGMA user_version").fetchone()[0]
     if not {"cameras", "images", "two_view_geometries"} <= set(_columns(database)):
-        return "no COLMAP"
+        return _NOBODY
     if version >= 1000000:
         return f"COLMAP {version // 1000000}.{version // 10000 % 100}.{version // 100 % 100}"
     return (
@@ -66,17 +70,48 @@ def reading(path):
         raise _explain(path, error) from None
 
 
-def _require_schema(database, path, schema, folder):
-    """Refuses a database of another COLMAP version, whose tables differ from those of this
-    schema."""
-    fresh = os.path.join(folder, "fresh.db")
-    schema.create(fresh)
-    with contextlib.closing(sqlite3.connect(fresh)) as expected:
-        wanted, maker = _columns(expected), maker_of(expected)
-    if _columns(database) != wanted:
-        raise BadInput(
-            f"{path}: made by {maker_of(database)}, and --schema {schema.NAME} is for {maker}"
-        )
+def _series(database):
+    """The first number of the COLMAP version that stamped the database; 0 where none did."""
+    version = database.execute("PRAGMA user_version").fetchone()[0]
+    return version // 1000000 or version // 1000
+
+
+def _difference(database, fresh):
+    """What keeps rows from being added as to `fresh`; empty where nothing does. The order of the
+    columns does not: COLMAP that brings an older database over adds its new columns at the end and
+    drops none. A column that is there besides must take rows that do not name it."""
+    found, wanted = _columns(database), _columns(fresh)
+    for table in sorted(found.keys() ^ wanted.keys()):
+        return f"{'another' if table in found else 'no'} table {table}"
+    for table, columns in wanted.items():
+        for name in sorted(set(columns) - set(found[table])):
+            return f"no column {name} in {table}"
+        for _, name, _, not_null, default, is_key in database.execute(
+                f"PRAGMA table_info('{table}')"):
+            if name not in columns and not_null and default is None and not is_key:
+                return f"a column {name} in {table} that must be filled"
+    return ""
+
+
+def _require_schema(made, path, schema, folder):
+    """Brings `made`, a copy of the database `path`, over to this schema if it is an older one of
+    the same series, and refuses a database of another COLMAP, whose tables differ."""
+    fresh_path = os.path.join(folder, "fresh.db")
+    schema.create(fresh_path)
+    with contextlib.closing(sqlite3.connect(fresh_path)) as fresh:
+        with contextlib.closing(sqlite3.connect(made)) as copy:
+            maker, wanted = maker_of(copy), maker_of(fresh)
+            series = _series(copy) if maker != _NOBODY else 0
+        if series == _series(fresh):
+            schema.bring_over(made)
+            with contextlib.closing(sqlite3.connect(made)) as copy:
+                words = _difference(copy, fresh)
+        else:
+            words = (f"COLMAP {_series(fresh)} brings it over when it opens it"
+                     if 0 < series < _series(fresh) else "its tables differ")
+    if words:
+        raise BadInput(f"{path}: made by {maker}, and --schema {schema.NAME} is for {wanted}: "
+                       f"{words}")
 
 
 def _settle(path):
@@ -130,10 +165,10 @@ def appended_database(path, schema):
             made = os.path.join(scratch, "made.db")
             target.execute("BEGIN IMMEDIATE")  # raises sqlite3.Error if it cannot be written
             target.rollback()
-            _require_schema(target, path, schema, scratch)
             before = target.execute("PRAGMA data_version").fetchone()
             with contextlib.closing(sqlite3.connect(made)) as copy:
                 target.backup(copy)
+            _require_schema(made, path, schema, scratch)
             with schema.Writer(made) as writer:
                 yield writer
                 writer.commit()
@@ -200,24 +235,61 @@ def read_keypoints(database, path, image_id):
     return _table(row, np.float32, path, f"keypoints of image {image_id}")
 
 
+@dataclass(frozen=True)
+class Descriptors:
+    """The descriptors of an image as its row has them."""
+
+    kind: str  #: the name of the feature; empty where the database does not say it
+    rows: np.ndarray  #: (n, bytes of one) uint8
+
+    def not_sift(self):
+        """Why they are not SIFT's 128 bytes; empty where they are, or where there are none to
+        judge. SIFT's have a length of 512 in COLMAP, OpenCV and VLFeat, and other numbers of 128
+        bytes, such as 32 floats, lengths above 1400: databases of COLMAP 3 do not say the kind,
+        and those that were brought over call all of them SIFT's."""
+        if self.kind not in ("", "SIFT"):
+            return self.kind
+        if not len(self.rows):
+            return ""
+        if self.rows.shape[1] != 128:
+            return f"{self.rows.shape[1]} bytes each, not 128"
+        length = np.median(np.linalg.norm(self.rows.astype(np.float64), axis=1))
+        return "" if 256 <= length <= 1024 else f"their length is {length:.0f}, not about 512"
+
+
 def read_descriptors(database, path, image_id):
-    """Reads the descriptors of an image as uint8, one row for each keypoint; SIFT's have 128
-    columns."""
+    """Reads the Descriptors of an image, one row for each keypoint."""
+    says_kind = "type" in _columns(database).get("descriptors", ())
     row = database.execute(
-        "SELECT rows, cols, data FROM descriptors WHERE image_id = ?", (image_id,)
+        f"SELECT {'type' if says_kind else -1}, rows, cols, data FROM descriptors "
+        "WHERE image_id = ?", (image_id,)
     ).fetchone()
-    return _table(row, np.uint8, path, f"descriptors of image {image_id}")
+    kind, *row = row or (-1, 0, 128, None)
+    name = "" if kind == -1 else _FEATURE_KINDS.get(kind, f"features of type {kind}")
+    return Descriptors(name, _table(row, np.uint8, path, f"descriptors of image {image_id}"))
+
+
+def _read_pairs(database, path, what, query):
+    """Reads [(image_id0, image_id1, matches (n, 2) uint32)] with image_id0 < image_id1."""
+    found = []
+    for pair, *row in database.execute(query):
+        id0, id1 = divmod(pair, schema38.MAX_IMAGES)
+        found.append((id0, id1, _table(row, np.uint32, path, f"{what} of images {id0} and {id1}")))
+    return found
 
 
 def read_matches(database, path):
-    """Reads [(image_id0, image_id1, matches (n, 2) uint32)] with image_id0 < image_id1."""
-    found = []
-    for pair, *row in database.execute(
-        "SELECT pair_id, rows, cols, data FROM matches ORDER BY pair_id"
-    ):
-        id0, id1 = divmod(pair, schema38.MAX_IMAGES)
-        found.append((id0, id1, _table(row, np.uint32, path, f"matches of images {id0} and {id1}")))
-    return found
+    """Reads the table `matches`, COLMAP's matches before their verification."""
+    return _read_pairs(database, path, "matches",
+                       "SELECT pair_id, rows, cols, data FROM matches ORDER BY pair_id")
+
+
+def read_verified_matches(database, path):
+    """Reads the inlier matches of `two_view_geometries` but for those of a watermark, which do not
+    tell how the camera moved."""
+    return _read_pairs(database, path, "verified matches",
+                       "SELECT pair_id, rows, cols, data FROM two_view_geometries "
+                       f"WHERE rows > 0 AND config != {WATERMARK} ORDER BY pair_id")
 
 
 def read_pair_ids(database):

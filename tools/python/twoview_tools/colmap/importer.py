@@ -85,6 +85,10 @@ def import_model(model, folder, pairs_file="", overlap=0, min_common_points=30):
     number of pairs."""
     names = ("pairs.txt", "cameras.yaml", "trajectory.tum")
     require_own(folder, "colmap import --model", names, names)
+    for name in model.images:
+        if any(c.isspace() for c in name):
+            raise BadInput(f"image '{name}': a blank in its name, which a pairs file cannot hold; "
+                           f"rename the picture, or give --database, too, for a report.json")
     cameras, cameras_text = _named_cameras(model)
     lines = []
     for pair in _choose(list(model.images), pairs_file, overlap):
@@ -98,8 +102,6 @@ def import_model(model, folder, pairs_file="", overlap=0, min_common_points=30):
             f"no two images of the model have {min_common_points} points in common "
             f"(--min-common-points)"
         )
-    if any(any(c.isspace() for c in name) for name in model.images):
-        raise BadInput("an image's name has a space in it, which a pairs file cannot hold")
     head = "# name0 name1 rot0 rot1 K0 K1 T_0to1; the truth is a COLMAP model's, in its unit\n"
     write_files(folder, {"pairs.txt": head + "\n".join(lines) + "\n", "cameras.yaml": cameras_text,
                          "trajectory.tum": write_trajectory(model.poses())})
@@ -109,11 +111,14 @@ def import_model(model, folder, pairs_file="", overlap=0, min_common_points=30):
 class Features:
     """The contents of a database: pixels and descriptors by image, matches by pair of names."""
 
+    MATCHES, VERIFIED, DESCRIPTORS = "matches", "two_view_geometries", "descriptors"
+
     def __init__(self, path, camera_files=()):
         self.path = path
         given = [read_camera(file) for file in camera_files]
         self._sigmas_given = [read_sigmas(file) for file in camera_files]
-        self.pixels, self.descriptors, self.cameras, self.matches = {}, {}, {}, {}
+        self.pixels, self.descriptors, self.cameras = {}, {}, {}
+        self.matches, self.verified = {}, {}  #: by pair of names, as two tables of the database
         self.sigmas = {}  #: CalibrationSigmas by image
         with db.reading(path) as database:
             try:
@@ -132,7 +137,11 @@ class Features:
                                  GUESSED if camera_id in guessed else EXACT)
             self.pixels[name] = pixels_from_colmap(db.read_keypoints(database, self.path, image_id))
             self.descriptors[name] = db.read_descriptors(database, self.path, image_id)
-        for id0, id1, matches in db.read_matches(database, self.path):
+        self._read_matches(db.read_matches(database, self.path), names, self.matches)
+        self._read_matches(db.read_verified_matches(database, self.path), names, self.verified)
+
+    def _read_matches(self, rows, names, into):
+        for id0, id1, matches in rows:
             name0, name1 = names[id0], names[id1]
             if (
                 len(matches)
@@ -141,24 +150,51 @@ class Features:
                 ).any()
             ):
                 raise BadInput(f"{self.path}: a match of {name0} and {name1} has no keypoint")
-            self.matches[name0, name1] = matches
+            into[name0, name1] = matches
 
     def guessed(self):
         """The names of the images whose focal length COLMAP guessed."""
         return sorted(name for name, sigmas in self.sigmas.items() if sigmas is GUESSED)
 
+    def has_pair(self, name0, name1):
+        """Whether a table has matches of the pair."""
+        return any(pair in table for table in (self.matches, self.verified)
+                   for pair in ((name0, name1), (name1, name0)))
+
+    def no_matches(self, name0, name1):
+        """Why matches of the pair cannot be made from the descriptors; empty where they can."""
+        for name in (name0, name1):
+            found, pixels = self.descriptors[name], self.pixels[name]
+            if found.not_sift():
+                return f"the descriptors are not SIFT's ({found.not_sift()})"
+            if len(found.rows) != len(pixels):
+                return ("there are no descriptors" if not len(found.rows) else
+                        f"image {name} has {len(pixels)} keypoints and {len(found.rows)} "
+                        f"descriptors")
+            if not len(pixels):
+                return f"image {name} has no keypoints"
+        return ""
+
     def matches_of(self, name0, name1, engine):
-        """(matches (n, 2), their ratios or None) in this order of the names. The database's matches
-        have no ratios. If the database has no row for the pair, our matcher makes the matches from
-        its descriptors; there are none if the descriptors do not have 128 bytes."""
-        if (name0, name1) in self.matches:
-            return self.matches[name0, name1], None
-        if (name1, name0) in self.matches:
-            return self.matches[name1, name0][:, ::-1], None
-        if self.descriptors[name0].shape[1] != 128 or self.descriptors[name1].shape[1] != 128:
-            return np.zeros((0, 2), np.uint32), None
-        found = engine.match(self.descriptors[name0], self.descriptors[name1])
-        return np.column_stack([found["idx0"], found["idx1"]]), found["ratio"].copy()
+        """(matches (n, 2), their ratios or None, what they are from or None) in this order of the
+        names. The database's matches have no ratios: those of `matches`, or the verified ones alone
+        where that table has none. If the database has no row for the pair, our matcher makes the
+        matches from its descriptors, if they are SIFT's."""
+        def row(table):
+            if (name1, name0) in table:
+                return table[name1, name0][:, ::-1]
+            return table.get((name0, name1))
+
+        given, verified = row(self.matches), row(self.verified)
+        if verified is not None and (given is None or not len(given)):
+            return verified, None, self.VERIFIED
+        if given is not None:
+            return given, None, self.MATCHES
+        if self.no_matches(name0, name1):
+            return np.zeros((0, 2), np.uint32), None, None
+        found = engine.match(self.descriptors[name0].rows, self.descriptors[name1].rows)
+        return (np.column_stack([found["idx0"], found["idx1"]]), found["ratio"].copy(),
+                self.DESCRIPTORS)
 
 
 def _sigmas_as_known(sigmas):
@@ -167,7 +203,7 @@ def _sigmas_as_known(sigmas):
 
 
 def _pair_report(name0, name1, features, engine, truth, options):
-    matches, ratios = features.matches_of(name0, name1, engine)
+    matches, ratios, origin = features.matches_of(name0, name1, engine)
     result, inliers = engine.estimate(
         features.cameras[name0], features.cameras[name1], features.pixels[name0][matches[:, 0]],
         features.pixels[name1][matches[:, 1]], ratios, options)
@@ -188,6 +224,7 @@ def _pair_report(name0, name1, features, engine, truth, options):
     row.update(
         {
             "num_matches": len(matches),
+            "matches_from": origin,
             "num_inliers": int(inliers.sum()),
             "precision": None,
             "config": result.kind.name.lower(),
@@ -215,6 +252,21 @@ def _require_own_report(folder):
         raise BadInput(foreign_words(folder, "report.json", "colmap import --database"))
 
 
+def _without_matches(path, features, pairs):
+    """{reason: number} of the pairs that no table has matches of and that none can be made for;
+    BadInput where that is each of them."""
+    if not pairs:
+        raise BadInput(f"{path}: {len(features.pixels)} images in it, two and more are needed")
+    reasons = [features.no_matches(pair.name0, pair.name1) for pair in pairs
+               if not features.has_pair(pair.name0, pair.name1)]
+    counts = {reason: reasons.count(reason) for reason in reasons if reason}
+    if sum(counts.values()) == len(pairs):
+        reason = max(counts, key=counts.get)
+        raise BadInput(f"{path}: {reason}, and matches are needed: the database has none of these "
+                       f"images (COLMAP's matcher of its features makes them)")
+    return counts
+
+
 def import_database(
     path,
     folder,
@@ -234,14 +286,16 @@ def import_database(
     EstimateOptions, {name: value}; None: as the cameras say."""
     _require_own_report(folder)
     features = Features(path, camera_files)
-    if pairs_file or overlap or not features.matches:
+    if pairs_file or overlap or not (features.matches or features.verified):
         pairs = _choose(list(features.pixels), pairs_file, overlap)
     else:
         pairs = [pair for pair in exhaustive(list(features.pixels))
-                 if features.matches.keys() & {(pair.name0, pair.name1), (pair.name1, pair.name0)}]
+                 if features.has_pair(pair.name0, pair.name1)]
+    without = _without_matches(path, features, pairs)
     most = max([len(pixels) for pixels in features.pixels.values()] + [1])
     engine = Engine(tv.FeatureOptions(max_keypoints=most), match, estimate,
-                    max_matches=max([len(m) for m in features.matches.values()] + [most]))
+                    max_matches=max([len(m) for table in (features.matches, features.verified)
+                                     for m in table.values()] + [most]))
     estimate = estimate or tv.EstimateOptions()
     sigmas_of = sigmas_of or _sigmas_as_known
     rows = []
@@ -260,7 +314,7 @@ def import_database(
         )
     }
     report.update(num_pairs=len(rows), pairs=rows, options={"database": os.path.basename(path)},
-                  guessed_focal_lengths=features.guessed(), seed=estimate.seed,
+                  guessed_focal_lengths=features.guessed(), without_matches=without, seed=estimate.seed,
                   version=tv.version_string())
     write_files(folder, {"report.json": json.dumps(metrics.finite(report), indent=1) + "\n"})
     return report

@@ -33,6 +33,24 @@ class Model:
         return {name: (image.R, image.centre) for name, image in self.images.items()}
 
 
+def _whole_names(path):
+    """{image_id: name} of images.txt. The name is the rest of its line, which COLMAP writes so and
+    reads up to the first blank: 'my 1.png' and 'my 2.png' become two images 'my' (pycolmap 4.2.1,
+    2026-11-29)."""
+    with open(path, encoding="utf-8", newline="\n") as file:
+        lines = [line.strip() for line in file]
+    names, at = {}, 0
+    while at < len(lines):
+        if lines[at] and not lines[at].startswith("#"):
+            fields = lines[at].split(None, 9)
+            if len(fields) < 10:
+                raise ValueError(f"images.txt: line {at + 1}: {len(fields)} fields, not 10")
+            names[int(fields[0])] = fields[9]
+            at += 1  # the line of the image's points, which may be empty, follows its own
+        at += 1
+    return names
+
+
 def read_model(folder):
     """Reads a folder with cameras, images and points3D, .txt or .bin."""
     colmap = need_pycolmap("reading a model")
@@ -48,6 +66,8 @@ def read_model(folder):
         )
     try:
         found = colmap.Reconstruction(folder)
+        names = (_whole_names(os.path.join(folder, "images.txt")) if suffix == ".txt" else
+                 {key: image.name for key, image in found.images.items()})
     except (RuntimeError, ValueError, IndexError) as error:
         raise BadInput(
             f"{folder}: not a COLMAP model: {' '.join(str(error).split())[:200]}"
@@ -59,11 +79,14 @@ def read_model(folder):
         for key, camera in found.cameras.items()
     }
     images = {}
-    for image in sorted(found.images.values(), key=lambda image: image.name):
+    for image in sorted(found.images.values(), key=lambda image: names[image.image_id]):
         if image.has_pose:
+            name = names[image.image_id]
+            if name in images:
+                raise BadInput(f"{folder}: two images are called {name}")
             pose = image.cam_from_world().matrix()
             seen = frozenset(point.point3D_id for point in image.get_observation_points2D())
-            images[image.name] = ModelImage(
+            images[name] = ModelImage(
                 image.camera_id, pose[:, :3].copy(), pose[:, 3].copy(), seen
             )
     error = found.compute_mean_reprojection_error() if found.num_points3D() else 0.0

@@ -49,6 +49,10 @@ def create(path):
         database.execute(f"PRAGMA user_version = {USER_VERSION}")
 
 
+def bring_over(path):
+    """Does nothing: no older database becomes one of this schema."""
+
+
 def pair_id(id0, id1):
     return min(id0, id1) * MAX_IMAGES + max(id0, id1)
 

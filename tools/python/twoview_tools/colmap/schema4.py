@@ -1,6 +1,6 @@
 """Writes the database of COLMAP 4 with pycolmap's own Database class."""
 
-from .errors import need_pycolmap
+from .errors import BadInput, need_pycolmap
 
 NAME = "4"
 
@@ -14,6 +14,19 @@ def create(path):
     need_pycolmap("--schema 4").Database.open(path).close()
 
 
+def bring_over(path):
+    """Brings a database of an earlier COLMAP 4 over, as COLMAP does itself when it opens one.
+    BadInput where COLMAP does not take it."""
+    log = need_pycolmap("--schema 4").logging
+    level, log.minloglevel = log.minloglevel, log.FATAL.value  # our own line says it
+    try:
+        create(path)
+    except RuntimeError:
+        raise BadInput("the database is one of COLMAP 4, but this COLMAP does not open it") from None
+    finally:
+        log.minloglevel = level
+
+
 class Writer:
     """Adds rows to a database; commit() makes them permanent. Each camera has a rig of its own, and
     each image a frame of its own."""
@@ -25,6 +38,7 @@ class Writer:
         self.transaction.__enter__()
         self.rigs = {rig.ref_sensor_id.id: rig.rig_id for rig in self.database.read_all_rigs()
                      if rig.ref_sensor_id.type == self.colmap.SensorType.CAMERA}
+        self._add_missing_frames()
 
     def __enter__(self):
         return self
@@ -54,13 +68,26 @@ class Writer:
     def add_image(self, name, camera_id):
         image = self.colmap.Image(name=name, camera_id=camera_id)
         image.image_id = self.database.write_image(image)
-        if camera_id not in self.rigs:
-            self._add_rig(self.database.read_camera(camera_id).sensor_id)
+        self._add_frame(image)
+        return image.image_id
+
+    def _add_frame(self, image):
+        if image.camera_id not in self.rigs:
+            self._add_rig(self.database.read_camera(image.camera_id).sensor_id)
         frame = self.colmap.Frame()
-        frame.rig_id = self.rigs[camera_id]
+        frame.rig_id = self.rigs[image.camera_id]
         frame.add_data_id(image.data_id)
         self.database.write_frame(frame)
-        return image.image_id
+
+    def _add_missing_frames(self):
+        """Gives the images that have none a frame. COLMAP, which brings a database of 3.x over,
+        makes no frames; its mapper (4.2.1) makes them where no image has one, and refuses a
+        database in which only some have."""
+        framed = {data.id for frame in self.database.read_all_frames() for data in frame.data_ids
+                  if data.sensor_id.type == self.colmap.SensorType.CAMERA}
+        for image in self.database.read_all_images():
+            if image.image_id not in framed:
+                self._add_frame(image)
 
     def add_features(self, image_id, keypoints, descriptors):
         self.database.write_keypoints(image_id, keypoints)
