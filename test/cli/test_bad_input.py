@@ -349,7 +349,9 @@ class Arguments(cli.CliTest):
 
     def test_bad_truth_is_refused(self):
         for text, word in (("t: [1, 0, 0]\n", "R"), ("R: [1,0,0, 0,1,0, 0,0,1]\n", "t"),
-                           ("R: [1,0,0, 0,1,0, 0,0,2]\nt: [1,0,0]\n", "rotation"),
+                           ("R: [1,0,0, 0,1,0, 0,0,2]\nt: [1,0,0]\n", "R holds no rotation"),
+                           ("R: [1,0,0, 0,1,0, 0,0,1.03]\nt: [1,0,0]\n", "differs by 0.03"),
+                           ("R: [1,0,0, 0,1,0, 0,0,-1]\nt: [1,0,0]\n", "reflection"),
                            ("R: [1,0,0, 0,1,0, 0,0,1]\nt: [0,0,0]\n", "t is 0"),
                            ("R: [1,0,0, 0,1,0, 0,0,1]\nt: [1,0]\n", "2 numbers"),
                            ("R: [1,0,0, 0,1,0, 0,0,1]\nt: [1,0,0]\ndepth0: no.pfm\n", "no.pfm")):

@@ -5,6 +5,8 @@ import json
 import math
 import os
 import shutil
+import signal
+import subprocess
 import sys
 import unittest
 from pathlib import Path
@@ -149,6 +151,9 @@ class Evaluate(cli.CliTest):
                             ("\n#\n" + pair_line().replace("300.0", "wide", 1), ("line 3", "wide")),
                             (pair_line().replace("300.0", "0", 1), ("line 1", "K0")),
                             (pair_line(T=[2] + SIDEWAYS[1:]), ("line 1", "rotation")),
+                            (pair_line(T=[1.03] + SIDEWAYS[1:]), ("line 1", "rotation", "0.03")),
+                            (pair_line() + pair_line(T=[-1] + SIDEWAYS[1:]),
+                             ("line 2", "reflection")),
                             (pair_line().replace("300.0", "nan", 1), ("line 1", "nan"))):
             with self.subTest(words=words):
                 self.assert_refused(self.evaluate(line), "pairs.txt", *words)
@@ -158,6 +163,34 @@ class Evaluate(cli.CliTest):
         last = pair_line().split()[:-4] + ["5", "0", "0", "1"]
         self.assert_refused(self.evaluate(" ".join(last)), "line 1", "0 0 0 1")
         self.assert_refused(self.evaluate(pair_line(), "--method", "upright"), "gravity")
+
+    def test_a_rotation_of_few_digits_is_made_one(self):
+        nearly = list(SIDEWAYS)
+        nearly[0], nearly[5], nearly[6] = 1.004, 0.998, 0.0004
+        pair = self.report(pair_line(T=nearly))["pairs"][0]
+        exact = self.report(pair_line())["pairs"][0]
+        # Half of the entry that has no counterpart across the diagonal is a turn: 0.0115 degrees.
+        self.assertAlmostEqual(pair["pose_error_deg"], exact["pose_error_deg"], delta=0.013)
+
+    def test_ctrl_c_keeps_the_pairs_that_are_done(self):
+        pairs = self.write("set/pairs.txt", pair_line() * 500)
+        with subprocess.Popen(
+                [cli.program(), "evaluate", pairs, "--images", self.folder, "-o", self.out],
+                stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                env={**os.environ, "TWOVIEW_PROGRESS_SECONDS": "0.001"}) as process:
+            while "3 of 500" not in process.stderr.readline():
+                self.assertIsNone(process.poll())
+            process.send_signal(signal.SIGINT)
+            said = process.communicate(timeout=60)[0]
+        self.assertEqual(process.returncode, 130)
+        report = json.loads((self.out / "report.json").read_text())
+        count = report["num_pairs"]
+        self.assertTrue(report["interrupted"])
+        self.assertGreaterEqual(count, 2)
+        self.assertLess(count, 500)
+        self.assertEqual(len(report["pairs"]), count)
+        self.assertIn(f"interrupted: the first {count} of 500 pairs", said)
+        self.assertFalse(self.report(pair_line())["interrupted"])
 
     def test_missing_files_and_flags_are_refused(self):
         done = self.run_program("evaluate", "no.txt", "--images", ".", "-o", self.out)

@@ -3,6 +3,8 @@
 // only inside functions that return plain values, since Unity leaves a failing test by longjmp,
 // which skips destructors.
 
+#include <array>
+#include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <functional>
@@ -45,6 +47,12 @@ std::string text_of(const Json& file, const Json& test) {
   return text;
 }
 
+// A rotation of a file is made one by iterations, whose last digits are not the format's.
+Json rounded(std::array<double, 9> R) {
+  for (double& value : R) value = std::round(value * 1e12) / 1e12;
+  return R;
+}
+
 Json pair_json(const Pair& pair) {
   const Json null;
   return {{"name0", pair.name0},
@@ -52,7 +60,7 @@ Json pair_json(const Pair& pair) {
           {"turns", {pair.turns0, pair.turns1}},
           {"K0", pair.has_K ? Json(pair.K0) : null},
           {"K1", pair.has_K ? Json(pair.K1) : null},
-          {"R", pair.has_truth ? Json(pair.R) : null},
+          {"R", pair.has_truth ? rounded(pair.R) : null},
           {"t", pair.has_truth ? Json(pair.t) : null}};
 }
 

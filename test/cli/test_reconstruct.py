@@ -129,6 +129,11 @@ class Reconstruct(cli.CliTest):
             errors["depth_error_p95_percent"], errors["depth_error_median_percent"]
         )
         self.assertIn("truth", done.stdout.decode())
+        # A truth whose numbers are a rotation to 8e-3 is made one.
+        self.write("truth.yaml", TRUTH.replace("R: [1, 0, 0, 0, 1", "R: [1.008, 0, 0, 0, 0.995"))
+        self.succeed(self.reconstruct("--truth", truth))
+        self.assertAlmostEqual(self.result()["truth"]["rotation_error_deg"],
+                               errors["rotation_error_deg"], delta=1e-6)
 
     def test_a_dense_cloud_is_dense_and_right(self):
         self.write("depth.pfm", cli.pfm(WIDTH, HEIGHT, lambda x, y: 0.5 * cli.true_depth(x, y)))

@@ -73,7 +73,9 @@ class Truths(CliTest):
                 (("line 1", "7 numbers", "angles"), "0 1 2 3 0 0 90\n"),
                 (("line 1", "none is qx", "roll"), "time,x,y,z,roll,pitch,yaw\n0,0,0,0,0,0,0\n"),
                 (("line 2", "length 90"), "0 0 0 0 0 0 0 1\n1 0 0 0 0 0 90 0\n"),
-                (("line 1", "no rotation"), "2 0 0 0 0 2 0 0 0 0 2 0\n")):
+                (("line 1", "no rotation"), "2 0 0 0 0 2 0 0 0 0 2 0\n"),
+                (("line 1", "no rotation", "0.03"), "1.03 0 0 0 0 1 0 0 0 0 1 0\n"),
+                (("line 1", "reflection"), "1 0 0 0 0 1 0 0 0 0 -1 0\n")):
             self.assert_refused(self.run_with(text), "truth.csv", *words)
 
 

@@ -138,7 +138,9 @@ class TestShift(unittest.TestCase):
 
     def test_the_parser_names_the_pipelines_that_there_are(self):
         from twoview_tools.compare import arguments, systems
-        self.assertEqual(list(arguments.PIPELINES), systems.PIPELINES)
+        for kind, ids in (("pipeline", arguments.PIPELINES), ("solver", arguments.SOLVERS),
+                          ("triangulation", arguments.TRIANGULATIONS)):
+            self.assertEqual(list(ids), [s.id for s in systems.of_kind(kind)])
 
 
 if __name__ == "__main__":

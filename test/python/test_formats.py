@@ -33,7 +33,9 @@ def listed(array):
 
 def pair_values(pair):
     return {"name0": pair.name0, "name1": pair.name1, "turns": list(pair.turns),
-            "K0": listed(pair.K0), "K1": listed(pair.K1), "R": listed(pair.R), "t": listed(pair.t)}
+            "K0": listed(pair.K0), "K1": listed(pair.K1), 
+            # Made a rotation by iterations, whose last digits are not the format's.
+            "R": None if pair.R is None else listed(np.round(pair.R, 12)), "t": listed(pair.t)}
 
 
 def camera_values(camera):

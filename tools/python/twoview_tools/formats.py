@@ -12,9 +12,9 @@ pairs.txt, PAIRS.txt. A line holds name0 name1 [rot0 rot1 [K0(9) K1(9) [T_0to1(1
 38 fields with white space between them. Blank lines are skipped, and so are lines whose first
 character after white space is "#". Lines end with LF or CR LF; a byte order mark is skipped. `rot`
 is a number of whole quarter turns counter-clockwise, read modulo 4. K is [fx 0 cx 0 fy cy 0 0 1]
-with positive focal lengths. T is [R t; 0 0 0 1]; each element of R R^T must be within 1e-3 of the
-identity's, and det R must be positive. A file without a pair is refused. The message for a refused
-line has the line's number.
+with positive focal lengths. T is [R t; 0 0 0 1]; R is replaced by the nearest rotation, of which no
+element may differ by more than 0.01, and det R must be positive (rotations.made_rotation). A file
+without a pair is refused. The message for a refused line has the line's number.
 
 Camera file. docs/formats.md states the formats and their entries. A name that is not known and may
 concern the lens is refused; others are left out. A lens of Brown and Conrady whose coefficients are
@@ -42,6 +42,8 @@ from typing import Optional
 
 import numpy as np
 from twoview import camera_files
+
+from .rotations import made_rotation
 
 MAX_PAIRS_BYTES = 64 << 20
 FIELD_COUNTS = (2, 4, 22, 38)
@@ -112,11 +114,10 @@ def _matrix(name, fields):
 
 def _motion(fields):
     T = np.array([_field(field) for field in fields]).reshape(4, 4)
-    R = T[:3, :3]
-    if not np.abs(R @ R.T - np.eye(3)).max() <= 1e-3:
-        raise FormatError("T_0to1 holds no rotation")
-    if np.linalg.det(R) < 0:
-        raise FormatError("T_0to1 holds a reflection, no rotation")
+    try:
+        R = made_rotation(T[:3, :3], "T_0to1")
+    except ValueError as error:
+        raise FormatError(str(error)) from None
     if T[3].tolist() != [0, 0, 0, 1]:
         raise FormatError("the last row of T_0to1 is not 0 0 0 1")
     return R, T[:3, 3]

@@ -12,6 +12,7 @@ namespace cli {
 constexpr int kExitPose = 0;
 constexpr int kExitBadInput = 2;
 constexpr int kExitNoPose = 3;
+constexpr int kExitInterrupted = 130;
 
 // Bad input or bad arguments. what() is the line printed for the user, without the program's name.
 struct BadInput : std::runtime_error {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <string>
 
 namespace cli {
 
@@ -15,5 +16,12 @@ Vector3 cross(const Vector3& a, const Vector3& b);
 double dot(const Vector3& a, const Vector3& b);
 double norm(const Vector3& v);
 double determinant(const Matrix3& a);
+
+// The rotation that is nearest to a matrix of a file (the least sum of squared differences), whose
+// numbers are rounded, or were estimated: 7-Scenes' poses are rotations to 5e-4. Throws BadInput,
+// whose text begins with `name`, where an entry is farther than kMostRotationError from it, and for
+// a reflection.
+constexpr double kMostRotationError = 0.01;
+Matrix3 made_rotation(const Matrix3& matrix, const std::string& name);
 
 }  // namespace cli

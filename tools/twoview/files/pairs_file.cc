@@ -39,16 +39,6 @@ void check_K(const std::array<double, 9>& K, const char* name) {
     throw BadInput(what + " is not [fx 0 cx 0 fy cy 0 0 1]");
 }
 
-void check_rotation(const std::array<double, 9>& R) {
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) {
-      double dot = 0;
-      for (int k = 0; k < 3; ++k) dot += R[size_t(3 * i + k)] * R[size_t(3 * j + k)];
-      if (std::abs(dot - (i == j)) > 1e-3) throw BadInput("T_0to1 holds no rotation");
-    }
-  if (determinant(R) < 0) throw BadInput("T_0to1 holds a reflection, no rotation");
-}
-
 Pair parse_line(const std::string& line) {
   std::istringstream stream(line);
   std::vector<std::string> fields;
@@ -79,7 +69,7 @@ Pair parse_line(const std::string& line) {
         pair.R[3 * row + column] = parse_number(fields[22 + 4 * row + column]);
       pair.t[row] = parse_number(fields[22 + 4 * row + 3]);
     }
-    check_rotation(pair.R);
+    pair.R = made_rotation(pair.R, "T_0to1");
     for (size_t column = 0; column < 4; ++column)
       if (parse_number(fields[34 + column]) != (column == 3 ? 1 : 0))
         throw BadInput("the last row of T_0to1 is not 0 0 0 1");

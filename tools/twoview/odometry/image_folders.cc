@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "base/error.h"
+#include "base/matrix.h"
 #include "base/output.h"
 #include "files/camera_file.h"
 #include "files/camera_formats.h"
@@ -197,8 +198,10 @@ void add_euroc_camera(Folder& folder) {
   const std::vector<double> T = numbers_at(file.root, "T_BS", path);
   if (T.size() != 16)
     throw BadInput(path + ": T_BS has " + std::to_string(T.size()) + " numbers, not 16");
-  folder.body_from_camera.emplace();
-  std::copy(T.begin(), T.begin() + 12, folder.body_from_camera->begin());
+  const Matrix3 R =
+      made_rotation({T[0], T[1], T[2], T[4], T[5], T[6], T[8], T[9], T[10]}, path + ": T_BS");
+  folder.body_from_camera = {R[0], R[1], R[2], T[3], R[3], R[4],
+                             R[5], T[7], R[6], R[7], R[8], T[11]};
 }
 
 // The camera of KITTI's calib.txt: the line of P0, 12 numbers.

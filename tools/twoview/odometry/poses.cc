@@ -15,8 +15,7 @@ namespace {
 constexpr size_t kMaxFileBytes = 1 << 28;
 constexpr size_t kTum = 8, kKitti = 12, kKitti4x4 = 16;
 constexpr const char* kSeparators = ",;";
-constexpr double kUnitError = 0.1;       // by how much a quaternion's length may differ from 1
-constexpr double kRotationError = 0.01;  // the same of the entries of R R^T
+constexpr double kUnitError = 0.1;  // by how much a quaternion's length may differ from 1
 
 [[noreturn]] void refuse_line(const std::string& file, int line, const std::string& why) {
   throw BadInput(file + ": line " + std::to_string(line) + " " + why);
@@ -24,19 +23,6 @@ constexpr double kRotationError = 0.01;  // the same of the entries of R R^T
 
 Pose pose_of_12(const double* m) {
   return {{m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]}, {m[3], m[7], m[11]}};
-}
-
-// The nearest rotation to a matrix that is one but for the rounding of its printed numbers.
-Matrix3 orthonormal(const Matrix3& m) {
-  const std::array<double, 4> q = quaternion_of(m);
-  return rotation_of_quaternion(q[0], q[1], q[2], q[3]);
-}
-
-double rotation_error(const Matrix3& m) {
-  const Matrix3 square = product(m, transposed(m));
-  double most = 0;
-  for (size_t i = 0; i < 9; ++i) most = std::max(most, std::abs(square[i] - (i % 4 == 0 ? 1 : 0)));
-  return most;
 }
 
 std::vector<double> numbers_in(const std::string& file, const TextLine& line) {
@@ -240,9 +226,7 @@ TruePoses load_trajectory(const std::string& file, const std::vector<double>& fr
       const size_t idx = truth.poses.size();
       if (idx >= frame_times.size()) break;  // the poses of frames beyond those that are here
       at = {frame_times[idx], pose_of_12(n.data())};
-      if (rotation_error(at.pose.R) > kRotationError)
-        refuse_line(file, line.number, "has a matrix that is no rotation");
-      at.pose.R = orthonormal(at.pose.R);
+      at.pose.R = made_rotation(at.pose.R, file + ": line " + std::to_string(line.number));
     } else {
       const auto value = [&](size_t column) { return n[layout.at[column]]; };
       const double length = std::sqrt(value(4) * value(4) + value(5) * value(5) +

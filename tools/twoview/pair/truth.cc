@@ -27,13 +27,8 @@ std::array<double, N> fixed(const YAML::Node& root, const std::string& entry,
 
 KnownPose read_pose(const YAML::Node& root, const std::string& path) {
   KnownPose pose;
-  pose.R = fixed<9>(root, "R", path);
+  pose.R = made_rotation(fixed<9>(root, "R", path), path + ": R");
   pose.t = fixed<3>(root, "t", path);
-  const Matrix3 identity = product(pose.R, transposed(pose.R));
-  for (size_t i = 0; i < 9; ++i)
-    if (!(std::abs(identity[i] - (i % 4 == 0)) <= 1e-3))
-      throw BadInput(path + ": R is no rotation");
-  if (determinant(pose.R) < 0) throw BadInput(path + ": R is no rotation but a reflection");
   if (norm(pose.t) == 0) throw BadInput(path + ": t is 0");
   return pose;
 }
@@ -121,9 +116,6 @@ KnownPose load_pose(const std::string& path) {
   read_focal_scale(root, path, pose);
   read_shift(root, path, pose);
   read_sizes(root, path, pose);
-  const cv::SVD svd(cv::Mat(3, 3, CV_64F, pose.R.data()));
-  const cv::Mat nearest = svd.u * svd.vt;
-  std::copy(nearest.begin<double>(), nearest.end<double>(), pose.R.begin());
   return pose;
 }
 

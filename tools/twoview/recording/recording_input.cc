@@ -13,22 +13,6 @@ namespace cli {
 namespace {
 
 constexpr size_t kMaxFileBytes = 1 << 20;
-constexpr double kOrthonormal = 1e-3;
-
-void require_rotation(const std::vector<double>& r, const std::string& name) {
-  const auto dot = [&](size_t a, size_t b) {
-    return r[3 * a] * r[3 * b] + r[3 * a + 1] * r[3 * b + 1] + r[3 * a + 2] * r[3 * b + 2];
-  };
-  bool good = true;
-  for (size_t a = 0; a < 3; ++a)
-    for (size_t b = a; b < 3; ++b)
-      good = good && std::abs(dot(a, b) - (a == b ? 1 : 0)) < kOrthonormal;
-  const double determinant = r[0] * (r[4] * r[8] - r[5] * r[7]) -
-                             r[1] * (r[3] * r[8] - r[5] * r[6]) +
-                             r[2] * (r[3] * r[7] - r[4] * r[6]);
-  if (!good || !(determinant > 0)) throw BadInput(name + " is not a rotation");
-}
-
 // The numbers of an optional entry; empty if the entry is missing.
 std::vector<double> optional_numbers(const YAML::Node& root, const std::string& entry, size_t count,
                                      const std::string& file) {
@@ -63,8 +47,10 @@ CameraMount mount_of(const RecordingOptions& options, const std::string& file) {
   for (const double number : position)
     if (!std::isfinite(number)) throw BadInput("--camera-in-body is not finite");
   if (!rotation.empty()) {
-    require_rotation(rotation, rotation_given ? "--body-from-camera" : file + ": body_from_camera");
     std::copy(rotation.begin(), rotation.end(), mount.body_from_camera.begin());
+    mount.body_from_camera = made_rotation(
+        mount.body_from_camera,
+        rotation_given ? "--body-from-camera" : file + ": body_from_camera");
   }
   std::copy(position.begin(), position.end(), mount.position.begin());
   return mount;

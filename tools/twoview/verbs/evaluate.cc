@@ -1,6 +1,7 @@
 // twoview evaluate PAIRS.txt: estimates the poses of many pairs and reports SuperGlue's measures of
 // their errors.
 
+#include <atomic>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -401,26 +402,36 @@ int evaluate(Arguments& a) {
   require_own_report(folder / name);
   Session session(common.options);
   std::vector<PairReport> reports;
+  const std::atomic<bool>& stop = stop_flag_for_signals();
   {
     const Progress progress(!common.quiet);
-    for (size_t i = 0; i < pairs.size(); ++i) {
+    for (size_t i = 0; i < pairs.size() && !stop; ++i) {
       progress.tell(std::to_string(i + 1) + " of " + std::to_string(pairs.size()) + ": " +
                     pairs[i].name0 + " " + pairs[i].name1);
       reports.push_back(evaluate_pair(a, cameras, pairs[i], session));
     }
   }
+  const bool interrupted = reports.size() < pairs.size();
+  if (reports.empty()) {
+    std::fputs("twoview: interrupted before the first pair was evaluated\n", stderr);
+    return kExitInterrupted;
+  }
+  if (interrupted)
+    common.note("interrupted: the first " + std::to_string(reports.size()) + " of " +
+                std::to_string(pairs.size()) + " pairs");
   const auto is_read = [](const PairReport& report) { return !report.json.contains("error"); };
   if (std::none_of(reports.begin(), reports.end(), is_read))
     throw BadInput("none of the " + std::to_string(reports.size()) + " pairs of " + a.pairs +
                    " could be evaluated: " + reports[0].json["error"].get<std::string>());
-  const Json report = report_json(a, reports, session);
+  Json report = report_json(a, reports, session);
+  report["interrupted"] = interrupted;
   files.add(name, json_text(report));
   if (common.json) print(json_text(report));
   const std::string notes = common.note_lines();
   if (common.speaks())
     print(notes + table(report) + "files      " + (files.folder() / name).string() + "\n");
   files.commit();
-  return 0;
+  return interrupted ? kExitInterrupted : 0;
 }
 
 }  // namespace

@@ -1,6 +1,8 @@
 """compare_colmap's options, from the standard library alone, so that --help needs no package."""
 
+import argparse
 import os
+import textwrap
 
 from ..parser import Parser
 from ..sizes import MAX_NATIVE_SIDE, RESIZE_LONG_SIDE
@@ -8,15 +10,33 @@ from ..sizes import MAX_NATIVE_SIDE, RESIZE_LONG_SIDE
 # The name under which the user started it: tools/twoview/verbs/python_verbs.cc sets TWOVIEW_VERB.
 PROGRAM = os.environ.get("TWOVIEW_VERB") or "compare_colmap"
 PIPELINES = ("twoview", "pycolmap", "pycolmap_defaults", "colmap", "opencv_fast", "opencv_sift")
+SOLVERS = ("twoview_five_point", "twoview_eight_point", "twoview_upright", "magsac_solver",
+           "usac_solver", "accurate_solver", "poselib_solver", "pycolmap_solver",
+           "pycolmap_tvg_solver", "opengv_nister", "opengv_nister_nonlinear", "opengv_stewenius",
+           "opengv_stewenius_nonlinear", "opengv_sevenpt", "opengv_sevenpt_nonlinear",
+           "opengv_eightpt", "opengv_eightpt_nonlinear")
+TRIANGULATIONS = ("twoview_poly", "twoview_poly_abs", "twoview_linear_eigen", "twoview_linear_ls",
+                  "twoview_iterative_eigen", "twoview_iterative_ls", "twoview_midpoint",
+                  "opencv_triangulate", "opencv_correct", "pycolmap_triangulate",
+                  "opengv_triangulate", "opengv_triangulate2")
 DESCRIPTION = """Runs twoview, COLMAP, OpenGV, OpenCV and PoseLib on the same image pairs and writes
 a report: index.html, pairs.csv, report.json. See docs/compare.md."""
 
 
+def _epilog():
+    lists = {"pipelines": PIPELINES, "solvers": SOLVERS, "triangulations": TRIANGULATIONS}
+    lines = [textwrap.fill(f"{kind}: {', '.join(ids)}", 78, initial_indent="  ",
+                           subsequent_indent="    ", break_on_hyphens=False)
+             for kind, ids in lists.items()]
+    return "\n".join(["systems, for --systems:", *lines, "",
+                      "exit status: 0 a report, whatever its rows say; 2 bad input; 130 interrupted",
+                      "(the same command goes on)"])
+
+
 def make_parser():
     parser = Parser(
-        prog=PROGRAM, description=DESCRIPTION,
-        epilog="exit status: 0 a report, whatever its rows say; 2 bad input; 130 interrupted "
-               "(the same command goes on)")
+        prog=PROGRAM, description=DESCRIPTION, epilog=_epilog(),
+        formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("pairs", nargs="+", metavar="PAIRS.txt",
                         help="lists of pairs: name0 name1 rot0 rot1 K0(9) K1(9) [T_0to1(16)]; "
                              "cameras.yaml beside one is read")
@@ -28,7 +48,7 @@ def make_parser():
                              "COLMAP's own reconstruction of the images")
     parser.add_argument("--systems", metavar="A,B,..",
                         help="only these: ids, families (opengv, opencv, ..), pipelines, solvers, "
-                             "triangulations (default: all)")
+                             "triangulations, all named below (default: all)")
     parser.add_argument("--matches", default="twoview", choices=PIPELINES,
                         help="whose matches the solvers get (default twoview)")
     parser.add_argument("--max-error-px", type=float, default=1.0, metavar="E",

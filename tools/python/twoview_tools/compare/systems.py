@@ -44,7 +44,9 @@ def _pipelines():
 
 
 def _solvers():
-    for method, note in (("five-point", "its default"), ("eight-point", "the paper's method"),
+    for method, note in (("five-point", "its default; from the pixels of the matches alone, as the "
+                                        "peers: the row twoview of the pipelines also knows how "
+                                        "precise each keypoint is, from its size"), ("eight-point", "the paper's method"),
                          ("upright", "gravity is the reference pose's: two of the three angles "
                                      "are given")):
         yield System("twoview_" + method.replace("-", "_"), f"twoview {method}", "solver",
@@ -74,7 +76,6 @@ def _triangulations():
 
 SYSTEMS = (*_pipelines(), *_solvers(), *_triangulations())
 KINDS = ("pipeline", "solver", "triangulation")
-PIPELINES = [s.id for s in SYSTEMS if s.kind == "pipeline"]  # arguments.PIPELINES
 
 
 def of_kind(kind, ids=None):

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-UNIT_ROTATION = 1e-3  # how far R R^T of a file may be from the identity
+from ..rotations import made_rotation
 
 
 class PoseError(ValueError):
@@ -171,8 +171,9 @@ def read_euroc(path, body_from_cam=None):
     rows = np.array(rows).reshape(-1, 8)
     poses = trajectory(rows[:, 0], rows[:, 1:4], rows[:, 4:8])
     if body_from_cam is not None:
-        poses.positions = poses.positions + poses.rotations @ np.asarray(body_from_cam)[:3, 3]
-        poses.rotations = poses.rotations @ np.asarray(body_from_cam)[:3, :3]
+        mount = np.asarray(body_from_cam)
+        poses.positions = poses.positions + poses.rotations @ mount[:3, 3]
+        poses.rotations = poses.rotations @ made_rotation(mount[:3, :3], "T_BS")
     return poses
 
 
@@ -183,14 +184,16 @@ def read_kitti(path, times):
         values = _numbers(line, None, path, number)
         if len(values) != 12:
             raise PoseError(f"{path}: line {number}: not 12 numbers")
-        rows.append(values)
+        matrix = np.array(values).reshape(3, 4)
+        try:
+            matrix[:, :3] = made_rotation(matrix[:, :3], f"{path}: line {number}")
+        except ValueError as error:
+            raise PoseError(str(error)) from None
+        rows.append(matrix)
     if len(rows) != len(times):
         raise PoseError(f"{path}: {len(rows)} poses, and {len(times)} times")
     matrices = np.array(rows).reshape(-1, 3, 4)
-    R = matrices[:, :, :3]
-    if not (np.abs(R @ R.transpose(0, 2, 1) - np.eye(3)) < UNIT_ROTATION).all():
-        raise PoseError(f"{path}: a line holds no rotation")
-    return Trajectory(times, matrices[:, :, 3], R)
+    return Trajectory(times, matrices[:, :, 3], matrices[:, :, :3])
 
 
 def read_poses(path, times=None, body_from_cam=None):
