@@ -17,7 +17,7 @@ import time
 import unittest
 from pathlib import Path
 
-from cli_support import CliTest, camera_yaml, main, png, program
+from cli_support import CliTest, camera_yaml, main, png, png_samples, program
 
 SHARED = Path(__file__).resolve().parents[2].parent / "shared"
 DATA = Path(os.environ.get("TWOVIEW_DATA") or SHARED / "data")
@@ -196,6 +196,44 @@ class OdometryTest(CliTest):
         middles = [sorted(d)[len(d) // 2] for d in depths.values()]
         self.assertGreater(min(map(len, depths.values())), 10)
         self.assertLess(max(middles) / min(middles), 1.06)
+
+    def test_the_points_have_the_colours_of_their_pixels(self):
+        """Every pixel is (v, v // 2, 255 - v), and so is every point; of grey ones (v, v, v)."""
+        grey = self.set_folder("grey")
+        coloured = self.set_folder("coloured")
+        for i, data in enumerate(PICTURES):
+            samples = [c for v in png_samples(data) for c in (v, v // 2, 255 - v)]
+            self.write(f"coloured/images/{i:05}.png",
+                       png(WIDTH, HEIGHT, samples, channels=3))
+        for folder, colour in ((grey, lambda v: (v, v, v)),
+                               (coloured, lambda v: (v, v // 2, 255 - v))):
+            self.succeed(self.odometry(folder))
+            head, body = (self.out / "cloud.ply").read_bytes().split(b"end_header\n", 1)
+            # COLMAP takes no other types and no other spelling of them.
+            self.assertEqual(re.findall(r"^property (\w+) (\w+)$", head.decode(), re.M), [
+                *(("float", name) for name in "xyz"),
+                *(("uchar", name) for name in ("red", "green", "blue")),
+                *(("float", name) for name in ("num_observations", "sigma", "segment"))])
+            points = list(struct.iter_unpack("<fffBBBfff", body))
+            self.assertGreater(len(points), 100)
+            self.assertGreater(len({p[3] for p in points}), 20)
+            for p in points:
+                self.assertEqual(p[3:6], colour(p[3]))
+                self.assertEqual(p[6], int(p[6]))
+                self.assertGreaterEqual(p[6], 2)
+            for line in (self.out / "colmap" / "points3D.txt").read_text().splitlines():
+                if not line.startswith("#"):
+                    red, green, blue = map(int, line.split()[4:7])
+                    self.assertEqual((red, green, blue), colour(red))
+            self.succeed(self.run_program("map", "export", self.out / "map.twm", "-o",
+                                          self.folder / "exported"))
+            data = (self.folder / "exported" / "cloud.ply").read_bytes()
+            greys = list(struct.iter_unpack("<fffBBBfff", data.split(b"end_header\n", 1)[1]))
+            self.assertTrue(all(p[3] == p[4] == p[5] for p in greys), "a map's are grey")
+            # The map's grey levels are of the same place, between pixels.
+            apart = sorted(abs(0.299 * p[3] + 0.587 * p[4] + 0.114 * p[5] - grey[3])
+                           for p, grey in zip(points, greys))
+            self.assertLess(apart[len(apart) // 2], 8)
 
     def test_the_colmap_model_is_consistent(self):
         self.succeed(self.odometry(self.set_folder()))

@@ -350,8 +350,8 @@ def test_verified_geometries_alone_are_used(exported, models, tmp_path, matches,
             database.execute("DELETE FROM matches")
         elif matches == "a row of none":
             database.execute("UPDATE matches SET rows = 0, data = NULL")
-        database.execute("UPDATE two_view_geometries SET F = NULL, E = NULL, H = NULL, qvec = NULL, "
-                         "tvec = NULL, config = 9 WHERE pair_id = 2147483647 + 2")
+        database.execute("UPDATE two_view_geometries SET F = NULL, E = NULL, H = NULL, "
+                         "qvec = NULL, tvec = NULL, config = 9 WHERE pair_id = 2147483647 + 2")
         database.execute("UPDATE two_view_geometries SET config = 7 "
                          "WHERE pair_id = 2147483647 + 3")
         database.execute("UPDATE descriptors SET type = 1")
@@ -364,7 +364,8 @@ def test_verified_geometries_alone_are_used(exported, models, tmp_path, matches,
     origin = "matches" if matches == "as they were" else "two_view_geometries"
     assert used["a.png", "b.png"]["matches_from"] == origin
     assert used["a.png", "b.png"]["rotation_error_deg"] < 0.3
-    assert ("5 pairs are those that COLMAP has verified already" in out) == (matches != "as they were")
+    words = "5 pairs are those that COLMAP has verified already"
+    assert (words in out) == (matches != "as they were")
     watermark = used.get(("a.png", "c.png"))
     assert (watermark is None if matches == "no row" else
             watermark["num_matches"] == 0 if matches == "a row of none" else
@@ -375,7 +376,8 @@ def test_verified_geometries_alone_are_used(exported, models, tmp_path, matches,
     refuse("a match of a.png and b.png has no keypoint", *arguments)
 
 
-BLANKS = {"a.png": "my a.png", "b.png": "my b.png", "c.png": "sub folder/c d.png", "d.png": "e\tf.png"}
+BLANKS = {"a.png": "my a.png", "b.png": "my b.png", "c.png": "sub folder/c d.png",
+          "d.png": "e\tf.png"}
 
 
 @pytest.mark.parametrize("form, newline", [("text", "\n"), ("text", "\r\n"), ("binary", "\n")])
@@ -453,6 +455,24 @@ def test_a_match_without_a_keypoint_is_named(tmp_path, refuse):
         "-o",
         tmp_path,
     )
+
+
+def test_colmap_takes_the_clouds(photographs, tmp_path):
+    """The clouds of reconstruct and odometry, which COLMAP and other programs import."""
+    program = os.environ.get("TWOVIEW_PROGRAM", "")
+    if not os.path.isfile(program):
+        pytest.skip("TWOVIEW_PROGRAM names no program")
+    (tmp_path / "cam.yaml").write_text(OPENCV_CAMERA)
+    pictures = [photographs / "images" / name for name in NAMES[:2]]
+    options = ("--camera", tmp_path / "cam.yaml", "--quiet", "-o", tmp_path / "out")
+    for more in ((), ("--dense", "2000")):
+        subprocess.run([program, "reconstruct", *pictures, *options, *more], check=True)
+        points = read_ply(tmp_path / "out" / "cloud.ply")
+        found = pycolmap.Reconstruction()
+        found.import_PLY(tmp_path / "out" / "cloud.ply")
+        assert found.num_points3D() == len(points) > 100
+        colours = sorted(point.color.tolist() for point in found.points3D.values())
+        assert colours == sorted([int(p["red"]), int(p["green"]), int(p["blue"])] for p in points)
 
 
 # ---- tests of results written as COLMAP models -------------------------------------------------

@@ -49,7 +49,8 @@ class FilmSource : public FrameSource {
       std::snprintf(name, sizeof name, "frame_%06d.png", frame.index);
       frame.name = name;
       frame.time_s = film.time_s();
-      frame.luma = turned(film.luma());
+      frame.colour = turned(film.picture());
+      frame.luma = luma_of(frame.colour);
       if (frame.luma.empty())
         frame.problem = "frame " + frame.name + " of " + file_ + " does not decode";
       goes_on = consume(frame);
@@ -76,12 +77,12 @@ class FilmSource : public FrameSource {
  private:
   std::string turn_note() const;
   std::string aspect_note() const;
-  cv::Mat turned(const cv::Mat& luma) const {
-    if (!is_turned_ || luma.empty()) return luma;
+  cv::Mat turned(const cv::Mat& pixels) const {
+    if (!is_turned_ || pixels.empty()) return pixels;
     Picture picture;
-    picture.luma = picture.colour = luma;
+    picture.luma = picture.colour = pixels;
     turn(picture, -facts_.turn_deg / 90);
-    return picture.luma;
+    return picture.colour;
   }
 
   std::string file_;
@@ -144,7 +145,10 @@ class Camera : public FrameSource {
       last = frame.time_s;
       frame.index = index;
       frame.name = "frame_" + std::to_string(index) + ".png";
-      if (camera_.retrieve(picture)) frame.luma = luma_of(picture);
+      if (camera_.retrieve(picture)) {
+        frame.luma = luma_of(picture);
+        frame.colour = picture;
+      }
       if (frame.luma.empty()) frame.problem = "a frame does not decode";
       if (!consume(frame)) return;
     }

@@ -3,12 +3,14 @@
 #include <time.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <map>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <set>
+#include <utility>
 
 #include "base/error.h"
 #include "files/camera_formats.h"
@@ -42,6 +44,16 @@ Thumbnail thumbnail_of(const cv::Mat& luma) {
   std::vector<uint8_t> bytes;
   cv::imencode(".jpg", small, bytes, {cv::IMWRITE_JPEG_QUALITY, 75});
   return {small.cols, small.rows, std::string(bytes.begin(), bytes.end())};
+}
+
+// The colour of the pixel that a place of a picture lies in, of which this one may be a larger
+// copy.
+Rgb colour_at(const cv::Mat& picture, double scale_x, double scale_y, double x, double y) {
+  const int column = static_cast<int>(std::floor((x + 0.5) * scale_x));
+  const int row = static_cast<int>(std::floor((y + 0.5) * scale_y));
+  const auto& bgr = picture.at<cv::Vec3b>(std::clamp(row, 0, picture.rows - 1),
+                                          std::clamp(column, 0, picture.cols - 1));
+  return {bgr[2], bgr[1], bgr[0]};
 }
 
 Pose pose_of(const double R[9], const double t[3]) {
@@ -223,9 +235,30 @@ void Flight::track_frame(SourceFrame frame) {
   picture_ = frame.luma;
   if (record.is_keyframe && options_.keeps_pictures)
     thumbnails_[static_cast<int>(given_.size())] = thumbnail_of(frame.luma);
+  if (record.is_keyframe) keep_colours(frame);
   masked_ += cli::masked_share(mask_);
   given_.push_back(frames_.size());
   frames_.push_back(record);
+}
+
+// A point is made of keypoints of a keyframe now or later, so all of them keep their colour.
+void Flight::keep_colours(const SourceFrame& frame) {
+  if (frame.colour.type() != CV_8UC3 || frame.colour.empty()) return;
+  std::vector<tv_map_observation> seen(static_cast<size_t>(options_.odometry.max_keypoints));
+  int32_t count = 0;
+  check(tv_odometry_last_frame(odometry_, seen.data(), static_cast<int32_t>(seen.size()), &count),
+        "frame " + frame.name);
+  const double scale_x = static_cast<double>(frame.colour.cols) / frame.luma.cols;
+  const double scale_y = static_cast<double>(frame.colour.rows) / frame.luma.rows;
+  std::vector<Rgb> colours(static_cast<size_t>(count));
+  bool is_grey = true;
+  for (size_t k = 0; k < colours.size(); ++k) {
+    colours[k] = colour_at(frame.colour, scale_x, scale_y, static_cast<double>(seen[k].x),
+                           static_cast<double>(seen[k].y));
+    is_grey = is_grey && colours[k][0] == colours[k][1] && colours[k][1] == colours[k][2];
+  }
+  // The points of a grey picture have the map's own grey levels, which are between pixels.
+  if (!is_grey) colours_[static_cast<int>(given_.size())] = std::move(colours);
 }
 
 void Flight::add_still_mask() {
@@ -354,6 +387,31 @@ std::vector<tv_map_point> Flight::points() const {
         "the map's points");
   points.resize(static_cast<size_t>(count));
   return points;
+}
+
+std::vector<Rgb> greys_of(const std::vector<tv_map_point>& points) {
+  std::vector<Rgb> greys;
+  greys.reserve(points.size());
+  for (const tv_map_point& point : points) {
+    const auto grey = static_cast<uint8_t>(std::clamp(point.grey, 0, 255));
+    greys.push_back({grey, grey, grey});
+  }
+  return greys;
+}
+
+std::vector<Rgb> Flight::colours(const std::vector<tv_map_point>& points,
+                                 const std::vector<FlightKeyframe>& keyframes) const {
+  std::vector<Rgb> colours = greys_of(points);
+  for (const FlightKeyframe& key : keyframes) {  // the newest comes last
+    const auto kept = colours_.find(key.keyframe.frame);
+    if (kept == colours_.end()) continue;
+    for (const tv_map_observation& seen : key.observations) {
+      const auto keypoint = static_cast<size_t>(seen.idx_keypoint);
+      if (seen.idx_point >= 0 && keypoint < kept->second.size())
+        colours[static_cast<size_t>(seen.idx_point)] = kept->second[keypoint];
+    }
+  }
+  return colours;
 }
 
 std::string Flight::map_bytes() const {

@@ -56,6 +56,9 @@ struct FlightKeyframe {
   std::array<double, 36> covariance{};
 };
 
+// The grey levels of points as colours.
+std::vector<std::array<uint8_t, 3>> greys_of(const std::vector<tv_map_point>& points);
+
 // The keyframes of a map in their order. max_keypoints: the odometry's own.
 std::vector<FlightKeyframe> keyframes_of(const tv_odometry* odometry, int32_t max_keypoints);
 
@@ -65,6 +68,8 @@ int count_segments(const std::vector<FlightKeyframe>& keyframes);
 // Fills the covariances of the keyframes, which are all of the odometry's map in their order. It
 // takes about as long as an adjustment each.
 void add_covariances(tv_odometry* odometry, std::vector<FlightKeyframe>& keyframes);
+
+using Rgb = std::array<uint8_t, 3>;
 
 // A small picture of a keyframe, for the report.
 struct Thumbnail {
@@ -141,6 +146,10 @@ class Flight {
   // The map as it is. The index of a point in points() is that of the observations.
   std::vector<FlightKeyframe> keyframes() const;
   std::vector<tv_map_point> points() const;
+  // For each of these points of the map the colour of its pixel in the newest of these keyframes
+  // that sees it and whose picture had colours; else its grey level.
+  std::vector<Rgb> colours(const std::vector<tv_map_point>& points,
+                           const std::vector<FlightKeyframe>& keyframes) const;
   std::string map_bytes() const;
   tv_odometry* odometry() const { return odometry_; }
 
@@ -152,6 +161,7 @@ class Flight {
   void start(const SourceFrame& frame);
   void track_frame(SourceFrame frame);
   void add_still_mask();
+  void keep_colours(const SourceFrame& frame);
   void locate(SourceFrame frame, FlightFrame& record, int32_t near_id);
 
   FrameSource& source_;
@@ -172,6 +182,8 @@ class Flight {
   double masked_ = 0;                    // sum of the shares that masks have left out
   std::vector<size_t> given_;            // indices of frames_
   std::map<int, Thumbnail> thumbnails_;  // by the number of the frame that was given
+  // The colours of the keypoints of the frames that were given and became keyframes.
+  std::map<int, std::vector<Rgb>> colours_;
   bool is_upright_ = false;
   bool gap_ = false;  // a frame was left out before the next one
   int num_unreadable_ = 0;

@@ -71,6 +71,7 @@ class ImageFolder : public FrameSource {
         if (picture.turn_deg != 0) turn_deg_ = picture.turn_deg;
         if (is_turned_) turn(picture, -picture.turn_deg / 90);
         frame.luma = picture.luma;
+        frame.colour = picture.colour;
         frame.exif = picture.exif;
         has_stretched_ = has_stretched_ || picture.is_stretched;
       } catch (const BadInput& e) {

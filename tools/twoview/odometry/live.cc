@@ -212,7 +212,7 @@ void LivePage::update(const Flight& flight) {
   json["height"] = flight.picture().rows;
   json["tracks"] = s.tracks(flight, points);
   const int32_t segment = newest_segment(flight);
-  Json path = Json::array(), cloud = Json::array(), grey = Json::array();
+  Json path = Json::array(), cloud = Json::array(), colour = Json::array();
   const std::vector<FlightFrame>& frames = flight.frames();
   const size_t step = frames.size() / kMaxPath + 1;
   for (size_t k = (frames.size() - 1) % step; k < frames.size(); k += step) {
@@ -220,15 +220,16 @@ void LivePage::update(const Flight& flight) {
     int32_t own = -1;
     if (position_of(flight, frames[k], t, &own) && own == segment) append(path, t);
   }
+  const std::vector<Rgb> colours = flight.colours(points, flight.keyframes());
   const size_t every = points.size() / kMaxPoints + 1;
   for (size_t k = 0; k < points.size(); k += every) {
     if (points[k].segment != segment) continue;
     append(cloud, points[k].position);
-    grey.push_back(points[k].grey);
+    for (const int value : colours[k]) colour.push_back(value);
   }
   json["path"] = path;
   json["points"] = cloud;
-  json["grey"] = grey;
+  json["colours"] = colour;
   if (state.has_pose != 0) {
     json["camera"] = Json::array();
     for (const double value : state.world_from_cam_R) json["camera"].push_back(rounded(value));

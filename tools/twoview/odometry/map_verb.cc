@@ -192,7 +192,7 @@ int map_export(const std::string& path, const std::string& output) {
                      {"frames.csv"}});
   FlightResult result;
   result.keyframes = map.keyframes_with_covariances();
-  files.add("cloud.ply", map_ply(cloud_points(map.points(), result.keyframes)));
+  files.add("cloud.ply", map_ply(map.points(), greys_of(map.points()), result.keyframes));
   files.add("keyframes.txt", keyframes_text(result));
   const std::string covariances = covariances_text(result.keyframes);
   if (!covariances.empty()) files.add("covariances.txt", covariances);

@@ -239,7 +239,7 @@ void make_files(const FlightResult& result, const std::optional<FilmLens>& lens,
   files.add("keyframes.txt", keyframes_text(result));
   const std::string covariances = covariances_text(result.keyframes);
   if (!covariances.empty()) files.add("covariances.txt", covariances);
-  files.add("cloud.ply", map_ply(cloud_points(result.points, result.keyframes)));
+  files.add("cloud.ply", map_ply(result.points, result.colours, result.keyframes));
   files.add("map.twm", flight.map_bytes());
 }
 

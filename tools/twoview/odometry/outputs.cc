@@ -6,7 +6,7 @@
 #include <map>
 #include <set>
 
-#include "report/tables.h"
+#include "report/ply.h"
 
 namespace cli {
 namespace {
@@ -136,11 +136,6 @@ float sigma_of(const tv_map_point& point) {
   return static_cast<float>(std::sqrt(std::max(0.0, c[0] + c[4] + c[8])));
 }
 
-void append_int(std::string& bytes, int32_t value) {
-  for (int shift = 0; shift < 32; shift += 8)
-    bytes += static_cast<char>(static_cast<uint32_t>(value) >> shift & 255);
-}
-
 std::string number_text(double value) {
   char text[40];
   std::snprintf(text, sizeof text, " %.17g", value);
@@ -212,6 +207,7 @@ FlightResult result_of(const Flight& flight, const std::optional<TruePoses>& tru
   result.keyframes = flight.keyframes();
   add_covariances(flight.odometry(), result.keyframes);
   result.points = flight.points();
+  result.colours = flight.colours(result.points, result.keyframes);
   result.segment = longest_segment(flight);
   result.live_stretch = longest_stretch(flight);
   if (truth) {
@@ -359,8 +355,8 @@ std::string frames_csv(const Flight& flight) {
   return text;
 }
 
-std::vector<tv_map_point> cloud_points(const std::vector<tv_map_point>& points,
-                                       const std::vector<FlightKeyframe>& keyframes) {
+std::vector<size_t> cloud_points(const std::vector<tv_map_point>& points,
+                                 const std::vector<FlightKeyframe>& keyframes) {
   std::vector<std::vector<Vector3>> rays(points.size());  // to each point, of length 1
   for (const FlightKeyframe& key : keyframes) {
     for (const tv_map_observation& seen : key.observations) {
@@ -374,31 +370,31 @@ std::vector<tv_map_point> cloud_points(const std::vector<tv_map_point>& points,
       rays[point].push_back(ray);
     }
   }
-  std::vector<tv_map_point> chosen;
+  std::vector<size_t> chosen;
   for (size_t k = 0; k < points.size(); ++k) {
     double cosine = 1;
     for (const Vector3& one : rays[k])
       for (const Vector3& other : rays[k]) cosine = std::min(cosine, dot(one, other));
-    if (cosine <= kMostCloudCosine) chosen.push_back(points[k]);
+    if (cosine <= kMostCloudCosine) chosen.push_back(k);
   }
   return chosen;
 }
 
-std::string map_ply(const std::vector<tv_map_point>& points) {
+std::string map_ply(const std::vector<tv_map_point>& points, const std::vector<Rgb>& colours,
+                    const std::vector<FlightKeyframe>& keyframes) {
+  const std::vector<size_t> chosen = cloud_points(points, keyframes);
   std::string bytes =
-      "ply\nformat binary_little_endian 1.0\ncomment twoview " + std::string(tv_version_string()) +
-      "\ncomment the map's world; points of different segments do not compare\n"
-      "element vertex " +
-      std::to_string(points.size()) +
-      "\nproperty float x\nproperty float y\nproperty float z\n"
-      "property uchar red\nproperty uchar green\nproperty uchar blue\n"
-      "property int num_observations\nproperty float sigma\nproperty int segment\nend_header\n";
-  for (const tv_map_point& point : points) {
+      ply_header({"the map's world; points of different segments do not compare"}, chosen.size(),
+                 {{PlyType::kFloat, {"x", "y", "z"}},
+                  {PlyType::kUchar, {"red", "green", "blue"}},
+                  {PlyType::kFloat, {"num_observations", "sigma", "segment"}}});
+  for (const size_t k : chosen) {
+    const tv_map_point& point = points[k];
     for (const double value : point.position) append_float(bytes, static_cast<float>(value));
-    bytes.append(3, static_cast<char>(std::clamp(point.grey, 0, 255)));
-    append_int(bytes, point.num_observations);
+    for (const uint8_t value : colours[k]) bytes += static_cast<char>(value);
+    append_float(bytes, static_cast<float>(point.num_observations));
     append_float(bytes, sigma_of(point));
-    append_int(bytes, point.segment);
+    append_float(bytes, static_cast<float>(point.segment));
   }
   return bytes;
 }
@@ -455,9 +451,10 @@ ColmapModel colmap_model(const FlightResult& result) {
     const tv_map_point& point = result.points[static_cast<size_t>(idx)];
     points += std::to_string(point.id + 1);
     for (const double value : point.position) points += number_text(value);
-    const std::string grey = " " + std::to_string(std::clamp(point.grey, 0, 255));
+    for (const int value : result.colours[static_cast<size_t>(idx)])
+      points += " " + std::to_string(value);
     const auto& [sum, count] = residuals[idx];
-    points += grey + grey + grey + number_text(count > 0 ? sum / count : -1.0);
+    points += number_text(count > 0 ? sum / count : -1.0);
     for (const Sighting& sighting : track)
       points += " " + std::to_string(sighting.image) + " " + std::to_string(sighting.idx);
     points += "\n";

@@ -24,6 +24,7 @@ struct FlightResult {
   int num_source_frames = 0;  // that the run was to track: after --every and --max-frames
   std::vector<FlightKeyframe> keyframes;
   std::vector<tv_map_point> points;
+  std::vector<Rgb> colours;  // of these points
   // The segment that the most frames have their final pose in, -1 without any pose.
   int32_t segment = -1;
   // The segment and unit that the most frames had when they were tracked: poses from before the
@@ -58,12 +59,14 @@ std::string covariances_text(const std::vector<FlightKeyframe>& keyframes);
 std::string frames_csv(const Flight& flight);
 // The words for a frame's reasons: those of the verdict, or "unreadable".
 std::string reasons_text(const FlightFrame& frame);
-// The points of the cloud: those that two keyframes see at an angle of at least 1.5 degrees. Below
-// that their distance is a guess.
-std::vector<tv_map_point> cloud_points(const std::vector<tv_map_point>& points,
-                                       const std::vector<FlightKeyframe>& keyframes);
-// x y z, colour, number of observations, standard deviation of the position, segment, of points.
-std::string map_ply(const std::vector<tv_map_point>& points);
+// The indices of the points of the cloud: those that two keyframes see at an angle of at least 1.5
+// degrees. Below that their distance is a guess.
+std::vector<size_t> cloud_points(const std::vector<tv_map_point>& points,
+                                 const std::vector<FlightKeyframe>& keyframes);
+// x y z, colour, number of observations, standard deviation of the position and segment of the
+// points of the cloud.
+std::string map_ply(const std::vector<tv_map_point>& points, const std::vector<Rgb>& colours,
+                    const std::vector<FlightKeyframe>& keyframes);
 
 // COLMAP's model of one segment as text: cameras.txt, images.txt, points3D.txt.
 struct ColmapModel {

@@ -9,7 +9,7 @@
 #include "pair/result.h"
 #include "report/assets.h"
 #include "report/html.h"
-#include "report/tables.h"
+#include "report/ply.h"
 
 namespace cli {
 namespace {
@@ -123,16 +123,16 @@ Json cameras_json(const FlightResult& result, const View& view) {
 
 Json cloud_json(const FlightResult& result) {
   const View view(result.flight->is_upright());
-  std::vector<tv_map_point> chosen;
-  for (const tv_map_point& point : cloud_points(result.points, result.keyframes))
-    if (point.segment == result.segment) chosen.push_back(point);
+  std::vector<size_t> chosen;
+  for (const size_t k : cloud_points(result.points, result.keyframes))
+    if (result.points[k].segment == result.segment) chosen.push_back(k);
   std::string points, colours;
   const size_t step = chosen.size() / kMaxCloudPoints + 1;
   for (size_t i = 0; i < chosen.size(); i += step) {
-    const tv_map_point& point = chosen[i];
+    const tv_map_point& point = result.points[chosen[i]];
     const Vector3 at = view({point.position[0], point.position[1], point.position[2]});
     for (const double value : at) append_float(points, static_cast<float>(value));
-    colours.append(3, static_cast<char>(std::clamp(point.grey, 0, 255)));
+    for (const uint8_t value : result.colours[chosen[i]]) colours += static_cast<char>(value);
   }
   return {{"points", base64(points)},
           {"colours", base64(colours)},

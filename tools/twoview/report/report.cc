@@ -6,7 +6,7 @@
 
 #include "report/assets.h"
 #include "report/html.h"
-#include "report/tables.h"
+#include "report/ply.h"
 
 namespace cli {
 namespace {

@@ -1,7 +1,6 @@
 #include "report/tables.h"
 
 #include <charconv>
-#include <cstring>
 
 namespace cli {
 namespace {
@@ -59,25 +58,14 @@ std::string points_csv(const std::vector<tv_point>& points) {
   return text;
 }
 
-void append_float(std::string& bytes, float value) {
-  uint32_t bits;
-  std::memcpy(&bits, &value, sizeof bits);
-  for (int shift = 0; shift < 32; shift += 8) bytes += static_cast<char>(bits >> shift & 255);
-}
-
 std::string cloud_ply(const std::vector<CloudPoint>& cloud, const char* unit, bool with_sigma) {
+  PlyColumns columns = {{PlyType::kFloat, {"x", "y", "z"}},
+                        {PlyType::kUchar, {"red", "green", "blue"}},
+                        {PlyType::kFloat, {"angle_deg", "error_px"}}};
+  if (with_sigma) columns.push_back({PlyType::kFloat, {"sigma", "sigma_pose"}});
   std::string bytes =
-      "ply\nformat binary_little_endian 1.0\n"
-      "comment twoview " +
-      std::string(tv_version_string()) +
-      "\ncomment frame of camera 0: x right, y down, z forward; unit: " + unit +
-      "\nelement vertex " + std::to_string(cloud.size()) +
-      "\n"
-      "property float x\nproperty float y\nproperty float z\n"
-      "property uchar red\nproperty uchar green\nproperty uchar blue\n"
-      "property float angle_deg\nproperty float error_px\n" +
-      std::string(with_sigma ? "property float sigma\nproperty float sigma_pose\n" : "") +
-      "end_header\n";
+      ply_header({std::string("frame of camera 0: x right, y down, z forward; unit: ") + unit},
+                 cloud.size(), columns);
   for (const CloudPoint& point : cloud) {
     for (const double value : {point.x, point.y, point.z})
       append_float(bytes, static_cast<float>(value));

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "pair/result.h"
+#include "report/ply.h"
 
 namespace cli {
 
@@ -21,13 +22,10 @@ const char* point_status_name(int32_t status);
 // the status infinite x y z is the direction, for invalid x y z are zeros.
 std::string points_csv(const std::vector<tv_point>& points);
 
-// The cloud as binary little-endian PLY: x y z float, red green blue uchar, angle_deg float,
+// The cloud as PLY: x y z float, red green blue uchar, angle_deg float,
 // error_px float and, where wanted, sigma float and sigma_pose float. unit: the words for the unit
 // of x y z, which a comment tells.
 std::string cloud_ply(const std::vector<CloudPoint>& cloud, const char* unit,
                       bool with_sigma = false);
-
-// Appends the little-endian bytes of a float.
-void append_float(std::string& bytes, float value);
 
 }  // namespace cli

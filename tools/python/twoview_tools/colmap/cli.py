@@ -202,15 +202,16 @@ def _import(arguments):
     areas = ", ".join(f"{area:.1f}" for area in report["auc"].values() if area is not None)
     _say(a, report, f"{a.output}/report.json: {report['num_pairs']} pairs, {posed} with a pose"
                     + (f"; AUC at 5, 10, 20 degrees {areas}" if areas else "")
-                    + _words_on_matches(report) + _words_on_guessed(report["guessed_focal_lengths"], a))
+                    + _words_on_matches(report)
+                    + _words_on_guessed(report["guessed_focal_lengths"], a))
     return EXIT_DONE if posed else EXIT_NO_POSE
 
 
 def _words_on_matches(report):
     """Continues the summary: how many pairs have verified matches alone, and how many none."""
     verified = sum(row["matches_from"] == "two_view_geometries" for row in report["pairs"])
-    words = (f"; the matches of {verified} pairs are those that COLMAP has verified already, as the "
-             f"table matches has none" if verified else "")
+    words = (f"; the matches of {verified} pairs are those that COLMAP has verified already, as "
+             f"the table matches has none" if verified else "")
     return words + "".join(f"; {count} pairs have no matches: {reason}"
                            for reason, count in report["without_matches"].items())
 

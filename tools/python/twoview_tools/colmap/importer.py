@@ -314,8 +314,8 @@ def import_database(
         )
     }
     report.update(num_pairs=len(rows), pairs=rows, options={"database": os.path.basename(path)},
-                  guessed_focal_lengths=features.guessed(), without_matches=without, seed=estimate.seed,
-                  version=tv.version_string())
+                  guessed_focal_lengths=features.guessed(), without_matches=without,
+                  seed=estimate.seed, version=tv.version_string())
     write_files(folder, {"report.json": json.dumps(metrics.finite(report), indent=1) + "\n"})
     return report
 

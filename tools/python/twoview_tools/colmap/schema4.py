@@ -22,7 +22,7 @@ def bring_over(path):
     try:
         create(path)
     except RuntimeError:
-        raise BadInput("the database is one of COLMAP 4, but this COLMAP does not open it") from None
+        raise BadInput("the database says COLMAP 4, and this COLMAP does not open it") from None
     finally:
         log.minloglevel = level
 
