@@ -246,10 +246,11 @@ std::string type_text(const Option& option) {
   return std::holds_alternative<Direction>(option.target) ? "x,y,z" : range_text(option);
 }
 
+std::string flag_of(const Option& option) { return "--" + std::string(option.name); }
+
 CLI::Option* add_option(CLI::App& verb, const Option& option) {
   CLI::Option* flag = verb.add_option_function<std::string>(
-      "--" + std::string(option.name), [option](const std::string& text) { set(option, text); },
-      option.help);
+      flag_of(option), [option](const std::string& text) { set(option, text); }, option.help);
   flag->type_name(type_text(option));
   if (!std::holds_alternative<Direction>(option.target)) flag->default_str(value_text(option));
   return flag;
@@ -370,6 +371,15 @@ void add_options(CLI::App& verb, Options& options, unsigned groups) {
     if (std::string(option.name) == "min-threshold")
       flag->each([&options](const std::string&) { options.min_threshold_given = true; });
   }
+}
+
+void exclude_matching(CLI::App& verb, CLI::Option& matches) {
+  Options options;
+  for (const Option& option : table(options))
+    if (option.group & (kFeature | kMatch)) matches.excludes(verb.get_option(flag_of(option)));
+  for (const char* const flag :
+       {"--mask", "--guided-matching", "--align-matches", "--bundle-adjustment", "--sigma-by-size"})
+    matches.excludes(verb.get_option(flag));
 }
 
 nlohmann::ordered_json options_json(const Options& options, unsigned groups) {

@@ -57,6 +57,10 @@ enum OptionGroup : unsigned {
 // Adds the flags of these groups to a verb. `options` must outlive the parsing.
 void add_options(CLI::App& verb, Options& options, unsigned groups);
 
+// Makes an option of the verb exclude those of corners, of descriptors, and of how they are matched
+// and made more precise, which do nothing where the matches are given.
+void exclude_matching(CLI::App& verb, CLI::Option& matches);
+
 // The options' values as a JSON object; in names "-" becomes "_".
 nlohmann::ordered_json options_json(const Options& options, unsigned groups);
 

@@ -20,6 +20,15 @@ struct MetricScale {
   double baseline_m = 0, sigma_m = 0;
 };
 
+// The arrays of a reconstruction of matches that were given; empty where the library found them and
+// holds the arrays.
+struct OwnArrays {
+  std::vector<tv_keypoint> keypoints[2];
+  std::vector<tv_correspondence> matches;
+  std::vector<uint8_t> inlier_mask;
+  std::vector<tv_point> points;
+};
+
 // All data from which the outputs of `reconstruct` are made.
 struct Outcome {
   Picture picture[2];
@@ -29,7 +38,9 @@ struct Outcome {
   // The cameras of the images as used: those of the camera files, scaled if the image was resized.
   tv_camera camera[2]{};
   tv_two_view two_view{};
-  tv_reconstruction reconstruction{};  // its arrays are valid until the context's next call
+  // Its arrays are in the context's memory until its next call, or in `own`.
+  tv_reconstruction reconstruction{};
+  OwnArrays own;
   std::optional<std::vector<tv_dense_point>> dense;  // empty: not asked for, or no full pose
   std::optional<MetricScale> scale;  // empty: outputs are in baselines, else in metres
   nlohmann::ordered_json json;       // the content of result.json

@@ -25,13 +25,16 @@ uint64_t now_ns() {
 
 void Session::Free::operator()(tv_context* context) const { tv_context_free(context); }
 
-tv_context* Session::context(int width, int height) {
-  if (context_ && width <= width_ && height <= height_) return context_.get();
+tv_context* Session::context(int width, int height, size_t max_matches) {
+  if (context_ && width <= width_ && height <= height_ && max_matches <= max_matches_)
+    return context_.get();
   tv_limits limits;
   tv_limits_init(&limits);
   limits.max_width = std::max(width, width_);
   limits.max_height = std::max(height, height_);
   limits.max_keypoints = options_.feature.max_keypoints;
+  max_matches_ = std::max(max_matches, max_matches_);
+  limits.max_matches = static_cast<int32_t>(max_matches_);
   limits.kernels = options_.kernels;
   context_.reset();
   check(tv_context_size(&limits, &context_bytes_), "cannot make a context");

@@ -20,9 +20,10 @@ class Session {
  public:
   explicit Session(const Options& options) : options_(options) {}
 
-  // Returns a context for images up to this size. If it must grow, the context that an earlier call
-  // returned is freed, so do not keep that pointer.
-  tv_context* context(int width, int height);
+  // Returns a context for images up to this size, and for this many matches where they are given
+  // (0: as many as keypoints). If it must grow, the context that an earlier call returned is freed,
+  // so do not keep that pointer.
+  tv_context* context(int width, int height, size_t max_matches = 0);
   tv_context* get() const { return context_.get(); }
   size_t context_bytes() const { return context_bytes_; }
   std::string kernels() const;
@@ -38,6 +39,7 @@ class Session {
   const Options& options_;
   std::unique_ptr<tv_context, Free> context_;
   int width_ = 0, height_ = 0;
+  size_t max_matches_ = 0;
   size_t context_bytes_ = 0;
 };
 

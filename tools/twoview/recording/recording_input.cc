@@ -48,9 +48,9 @@ CameraMount mount_of(const RecordingOptions& options, const std::string& file) {
     if (!std::isfinite(number)) throw BadInput("--camera-in-body is not finite");
   if (!rotation.empty()) {
     std::copy(rotation.begin(), rotation.end(), mount.body_from_camera.begin());
-    mount.body_from_camera = made_rotation(
-        mount.body_from_camera,
-        rotation_given ? "--body-from-camera" : file + ": body_from_camera");
+    mount.body_from_camera =
+        made_rotation(mount.body_from_camera,
+                      rotation_given ? "--body-from-camera" : file + ": body_from_camera");
   }
   std::copy(position.begin(), position.end(), mount.position.begin());
   return mount;

@@ -15,10 +15,13 @@
 #include "files/camera_file.h"
 #include "files/camera_formats.h"
 #include "files/camera_set.h"
+#include "files/match_folder.h"
+#include "files/own_poses.h"
 #include "files/pairs_file.h"
 #include "pair/camera_advice.h"
 #include "pair/measures.h"
 #include "pair/options.h"
+#include "pair/own_matches.h"
 #include "pair/reconstruct_pair.h"
 #include "verbs/verbs.h"
 
@@ -37,6 +40,8 @@ struct Arguments {
   double focal_35mm = 0;
   bool scales_camera = false;
   int max_pairs = 0;
+  OwnMatchOptions own;
+  std::vector<std::string> poses;  // of --poses, each [NAME=]FILE
 };
 
 struct Errors {
@@ -49,6 +54,7 @@ struct PairReport {
   Json json;
   bool has_truth = false;
   Errors errors;
+  std::vector<Errors> own_errors;      // of the systems of --poses, in their order
   std::optional<ShiftEvidence> shift;  // empty where the pair says nothing of its camera
 };
 
@@ -97,24 +103,59 @@ void load_pair(Arguments& a, const Cameras& cameras, const Pair& pair, Outcome& 
   }
 }
 
+// The errors of a pose against that of the list.
+Errors errors_of(const Matrix3& R, const Vector3& t, const Matrix3& R_true, const Vector3& t_true) {
+  return {rotation_error_deg(R, R_true), translation_error_deg(t, t_true),
+          translation_error_signed_deg(t, t_true)};
+}
+
+void add_errors(const Errors& errors, Json& json) {
+  json["rotation_error_deg"] = finite_or_null(errors.rotation);
+  json["translation_error_deg"] = finite_or_null(errors.translation);
+  json["translation_error_signed_deg"] = finite_or_null(errors.translation_signed);
+  json["pose_error_deg"] = finite_or_null(errors.pose());
+}
+
+// Compares the poses of the user's systems with the list's.
+void compare_own(const std::vector<OwnPoses>& systems, const Pair& pair, PairReport& report) {
+  if (!pair.has_truth || systems.empty()) return;
+  for (const OwnPoses& system : systems) {
+    bool is_listed = false;
+    const std::optional<OwnPose> pose = system.of(pair.name0, pair.name1, &is_listed);
+    report.own_errors.push_back(pose ? errors_of(pose->R, pose->t, pair.R, pair.t) : Errors());
+    add_errors(report.own_errors.back(), report.json["systems"][system.name]);
+  }
+}
+
 void compare(const Pair& pair, const Outcome& outcome, PairReport& report) {
   const Matrix3 turn0 = turn_matrix(pair.turns0), turn1 = turn_matrix(pair.turns1);
   const Matrix3 R_true = product(product(turn1, pair.R), transposed(turn0));
   const Vector3 t_true = applied(turn1, pair.t);
   const tv_two_view& v = outcome.two_view;
   if (v.has_R) report.errors.rotation = rotation_error_deg(rotation_of(v), R_true);
-  if (has_full_pose(v)) {
-    const Vector3 t = translation_of(v);
-    report.errors.translation = translation_error_deg(t, t_true);
-    report.errors.translation_signed = translation_error_signed_deg(t, t_true);
-  }
+  if (has_full_pose(v))
+    report.errors = errors_of(rotation_of(v), translation_of(v), R_true, t_true);
   // Precision compares the matches with the true pose, which refers to the given cameras and not to
   // those with a shifted principal point.
   report.json["precision"] =
       match_precision(outcome.camera[0], outcome.camera[1], R_true, t_true, outcome.reconstruction);
 }
 
-PairReport evaluate_pair(Arguments& a, const Cameras& cameras, const Pair& pair, Session& session) {
+// Estimates the pair of the outcome, from its pictures or from the matches of --matches. Returns
+// the time in nanoseconds.
+uint64_t estimate_pair(Arguments& a, const Pair& pair, MatchFolder* folder, Session& session,
+                       Outcome& outcome) {
+  if (!folder) return reconstruct_pair(session, a.common.options, outcome);
+  std::string file;
+  MatchList matches = folder->matches_of(pair.name0, pair.name1, &file);
+  fit_to_pictures(outcome.picture, a.own.resize, file, matches);
+  const std::string note = left_out_note(matches, "the files of matches");
+  if (!note.empty()) a.common.note(note);
+  return estimate_own_matches(session, a.common.options, matches, outcome);
+}
+
+PairReport evaluate_pair(Arguments& a, const Cameras& cameras, const Pair& pair,
+                         MatchFolder* folder, Session& session) {
   PairReport report;
   report.has_truth = pair.has_truth;
   Json& json = report.json;
@@ -129,7 +170,7 @@ PairReport evaluate_pair(Arguments& a, const Cameras& cameras, const Pair& pair,
   try {
     Outcome outcome;
     load_pair(a, cameras, pair, outcome);
-    const uint64_t total_ns = reconstruct_pair(session, a.common.options, outcome);
+    const uint64_t total_ns = estimate_pair(a, pair, folder, session, outcome);
     const tv_two_view& v = outcome.two_view;
     if (a.common.options.masks.given())
       json["masked_share"] = {masked_share(outcome.picture[0].mask),
@@ -151,19 +192,25 @@ PairReport evaluate_pair(Arguments& a, const Cameras& cameras, const Pair& pair,
   } catch (const BadInput& e) {
     json["error"] = e.what();
   }
-  if (pair.has_truth) {
-    json["rotation_error_deg"] = finite_or_null(report.errors.rotation);
-    json["translation_error_deg"] = finite_or_null(report.errors.translation);
-    json["translation_error_signed_deg"] = finite_or_null(report.errors.translation_signed);
-    json["pose_error_deg"] = finite_or_null(report.errors.pose());
-  }
+  if (pair.has_truth) add_errors(report.errors, json);
   return report;
 }
 
-Json auc_json(const std::vector<PairReport>& reports, double (Errors::*error)() const) {
-  std::vector<double> errors;
+// The errors of the pairs with a truth: of twoview, or of the user's system of this number.
+constexpr size_t kTwoview = SIZE_MAX;
+std::vector<Errors> errors_of_pairs(const std::vector<PairReport>& reports, size_t system) {
+  std::vector<Errors> errors;
   for (const PairReport& report : reports)
-    if (report.has_truth) errors.push_back((report.errors.*error)());
+    if (report.has_truth)
+      errors.push_back(system == kTwoview ? report.errors : report.own_errors[system]);
+  return errors;
+}
+
+Json auc_json(const std::vector<PairReport>& reports, size_t system,
+              double (Errors::*error)() const) {
+  std::vector<double> errors;
+  for (const Errors& of_pair : errors_of_pairs(reports, system))
+    errors.push_back((of_pair.*error)());
   Json json;
   for (const int threshold : kThresholdsDeg)
     json[std::to_string(threshold)] =
@@ -179,10 +226,9 @@ Json mean_of(const std::vector<PairReport>& reports, const char* key) {
   return count ? Json(sum / count) : Json(nullptr);
 }
 
-Json median_error(const std::vector<PairReport>& reports) {
+Json median_error(const std::vector<PairReport>& reports, size_t system) {
   std::vector<double> errors;
-  for (const PairReport& report : reports)
-    if (report.has_truth) errors.push_back(report.errors.pose());
+  for (const Errors& of_pair : errors_of_pairs(reports, system)) errors.push_back(of_pair.pose());
   if (errors.empty()) return nullptr;
   std::sort(errors.begin(), errors.end());
   return finite_or_null((errors[(errors.size() - 1) / 2] + errors[errors.size() / 2]) / 2);
@@ -223,25 +269,46 @@ Json principal_points_json(const std::vector<PairReport>& reports) {
   return list;
 }
 
-Json report_json(const Arguments& a, const std::vector<PairReport>& reports,
-                 const Session& session) {
+// A row for each of the user's systems.
+Json systems_json(const std::vector<OwnPoses>& systems, const std::vector<PairReport>& reports) {
+  Json list = Json::array();
+  for (size_t i = 0; i < systems.size(); ++i) {
+    const std::vector<Errors> errors = errors_of_pairs(reports, i);
+    list.push_back(
+        {{"name", systems[i].name},
+         {"auc", auc_json(reports, i, &Errors::pose)},
+         {"auc_signed", auc_json(reports, i, &Errors::pose_signed)},
+         {"median_pose_error_deg", median_error(reports, i)},
+         {"num_pairs", errors.size()},
+         {"num_without_pose", std::count_if(errors.begin(), errors.end(), [](const Errors& error) {
+            return !std::isfinite(error.pose());
+          })}});
+  }
+  return list;
+}
+
+Json report_json(const Arguments& a, const std::vector<OwnPoses>& systems,
+                 const std::vector<PairReport>& reports, const Session& session) {
   const Options& options = a.common.options;
   Json json;
-  json["auc"] = auc_json(reports, &Errors::pose);
-  json["auc_signed"] = auc_json(reports, &Errors::pose_signed);
+  json["auc"] = auc_json(reports, kTwoview, &Errors::pose);
+  json["auc_signed"] = auc_json(reports, kTwoview, &Errors::pose_signed);
   json["num_pairs"] = reports.size();
   json["verdict_counts"] = verdict_counts(reports);
   json["num_unreadable"] =
       std::count_if(reports.begin(), reports.end(),
                     [](const PairReport& report) { return report.json.contains("error"); });
-  json["median_pose_error_deg"] = median_error(reports);
+  json["median_pose_error_deg"] = median_error(reports, kTwoview);
   for (const char* key : {"num_matches", "num_inliers", "precision", "time_ms"})
     json["mean_" + std::string(key)] = mean_of(reports, key);
   json["principal_points"] = principal_points_json(reports);
+  json["systems"] = systems_json(systems, reports);
   json["pairs"] = Json::array();
   for (const PairReport& report : reports) json["pairs"].push_back(report.json);
   json["options"] = options_json(options, kAllOptions);
   json["options"]["max_pairs"] = a.max_pairs;
+  a.own.add_json(json["options"]);
+  json["options"]["poses"] = a.poses;
   json["options"]["camera"] = a.camera.empty() ? Json(nullptr) : Json(a.camera);
   json["options"]["focal_35mm"] = a.focal_35mm > 0 ? Json(a.focal_35mm) : Json(nullptr);
   json["seed"] = options.estimate.seed;
@@ -290,6 +357,18 @@ std::string advice_lines(const Json& report) {
   return text;
 }
 
+// A line for each of the user's systems.
+std::string system_lines(const Json& report) {
+  std::string text;
+  for (const Json& system : report["systems"])
+    text += padded(system["name"].get<std::string>(), 11) +
+            " at 5, 10, 20 deg:" + cell(system["auc"]["5"], "%6.1f", 6) +
+            cell(system["auc"]["10"], "%6.1f", 6) + cell(system["auc"]["20"], "%6.1f", 6) +
+            " %; median pose error" + cell(system["median_pose_error_deg"], " %.2f deg", 4) + ", " +
+            system["num_without_pose"].dump() + " without a pose\n";
+  return text;
+}
+
 std::string table(const Json& report) {
   const Style style = stdout_style();
   const size_t width[2] = {name_width(report["pairs"], "name0"),
@@ -316,6 +395,7 @@ std::string table(const Json& report) {
     text += padded(key, 11) + " at 5, 10, 20 deg:" + cell(auc["5"], "%6.1f", 6) +
             cell(auc["10"], "%6.1f", 6) + cell(auc["20"], "%6.1f", 6) + " %\n";
   }
+  text += system_lines(report);
   const Json& counts = report["verdict_counts"];
   text += std::to_string(report["num_pairs"].get<size_t>()) + " pairs: ";
   for (const auto& [verdict, count] : counts.items())
@@ -379,6 +459,26 @@ void require_own_report(const fs::path& path) {
                    " is not of an earlier run of twoview evaluate: give another -o");
 }
 
+// The systems of --poses. Throws BadInput where two have one name, or one has no pair of the list.
+std::vector<OwnPoses> load_systems(const Arguments& a, const std::vector<Pair>& pairs) {
+  std::vector<OwnPoses> systems;
+  for (const std::string& given : a.poses) {
+    systems.push_back(load_own_poses(given));
+    const OwnPoses& system = systems.back();
+    for (size_t i = 0; i + 1 < systems.size(); ++i)
+      if (systems[i].name == system.name)
+        throw BadInput("--poses: two systems are called " + system.name + "; give NAME=FILE");
+    const auto has = [&](const Pair& pair) {
+      bool is_listed = false;
+      system.of(pair.name0, pair.name1, &is_listed);
+      return is_listed;
+    };
+    if (std::none_of(pairs.begin(), pairs.end(), has))
+      throw BadInput("--poses: " + given + " has no pair of " + a.pairs);
+  }
+  return systems;
+}
+
 int evaluate(Arguments& a) {
   Common& common = a.common;
   if (common.options.estimate.method == TV_SOLVER_UPRIGHT)
@@ -391,6 +491,9 @@ int evaluate(Arguments& a) {
   if (a.max_pairs > 0 && pairs.size() > static_cast<size_t>(a.max_pairs))
     pairs.resize(static_cast<size_t>(a.max_pairs));
   const Cameras cameras = load_cameras(a);
+  const std::vector<OwnPoses> systems = load_systems(a, pairs);
+  std::optional<MatchFolder> folder_of_matches;
+  if (a.own.given()) folder_of_matches.emplace(a.own.path);
 
   fs::path folder;
   std::string name;
@@ -399,6 +502,7 @@ int evaluate(Arguments& a) {
   OutputSet files(folder);
   files.keep(a.pairs);
   files.keep(camera_path(a.camera));
+  for (const std::string& given : a.poses) files.keep(file_of_poses(given));
   require_own_report(folder / name);
   Session session(common.options);
   std::vector<PairReport> reports;
@@ -408,7 +512,9 @@ int evaluate(Arguments& a) {
     for (size_t i = 0; i < pairs.size() && !stop; ++i) {
       progress.tell(std::to_string(i + 1) + " of " + std::to_string(pairs.size()) + ": " +
                     pairs[i].name0 + " " + pairs[i].name1);
-      reports.push_back(evaluate_pair(a, cameras, pairs[i], session));
+      reports.push_back(evaluate_pair(a, cameras, pairs[i],
+                                      folder_of_matches ? &*folder_of_matches : nullptr, session));
+      compare_own(systems, pairs[i], reports.back());
     }
   }
   const bool interrupted = reports.size() < pairs.size();
@@ -423,7 +529,7 @@ int evaluate(Arguments& a) {
   if (std::none_of(reports.begin(), reports.end(), is_read))
     throw BadInput("none of the " + std::to_string(reports.size()) + " pairs of " + a.pairs +
                    " could be evaluated: " + reports[0].json["error"].get<std::string>());
-  Json report = report_json(a, reports, session);
+  Json report = report_json(a, systems, reports, session);
   report["interrupted"] = interrupted;
   files.add(name, json_text(report));
   if (common.json) print(json_text(report));
@@ -453,7 +559,16 @@ void add_evaluate(CLI::App& program, Run& run) {
         return count[0] == '-' ? count + " is negative" : std::string();
       })
       ->type_name("N");
+  verb->add_option("--poses", a->poses,
+                   "poses by another program, as a row of its own: name0 name1 and the rows of "
+                   "[R t], a line a pair; may be given several times")
+      ->type_name("[NAME=]FILE")
+      ->allow_extra_args(false);
   add_common(*verb, a->common, kAllOptions, "folder for report.json, or the file itself");
+  a->own.add_to(*verb,
+                "folder with the matches of each pair by another program, in place of twoview's: "
+                "NAME0_NAME1_matches.npz and the like, or .csv",
+                "DIR");
   verb->final_callback([a, &run] { run = [a] { return evaluate(*a); }; });
 }
 

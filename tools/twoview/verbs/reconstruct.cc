@@ -12,6 +12,7 @@
 #ifdef TWOVIEW_HAS_DENSE
 #include "pair/dense_cloud.h"
 #endif
+#include "pair/own_matches.h"
 #include "pair/reconstruct_pair.h"
 #include "pair/simple_lens.h"
 #include "pair/truth.h"
@@ -35,6 +36,7 @@ struct Arguments {
   std::string image[2], truth, rerun;
   CameraOptions cameras;
   RecordingOptions recording;
+  OwnMatchOptions own;
   int32_t dense = 0;  // most dense points; 0: no dense cloud
 };
 
@@ -51,6 +53,7 @@ void check_inputs(const Arguments& a) {
     return;
   }
   if (!a.image[0].empty()) throw BadInput("give A and B or --recording, not both");
+  if (a.own.given()) throw BadInput("--matches are of A and B, and not of a --recording");
   if (a.cameras.focal_35mm == kAutoFocal)
     throw BadInput(
         "--focal-35mm auto: a recording is twoview odometry's, which estimates it from the flight");
@@ -219,6 +222,7 @@ nlohmann::ordered_json options_of(const Arguments& a) {
   }
   const double focal = a.cameras.focal_35mm;
   json["dense"] = a.dense;
+  a.own.add_json(json);
   json["focal_35mm"] = nullptr;
   if (focal == kAutoFocal) json["focal_35mm"] = "auto";
   if (focal > 0) json["focal_35mm"] = focal;
@@ -421,8 +425,15 @@ int reconstruct(Arguments& a) {
     recording = std::make_unique<RecordingInput>(a.recording, a.cameras.both);
   Session session(common.options);
   Outcome outcome;
+  MatchList own_matches;
+  if (a.own.given()) own_matches = load_matches(a.own.path);
   const ImageCameras cameras = load_inputs(a, recording.get(), session, outcome);
   if (recording) recording->add_gravity(common.options.estimate);
+  if (a.own.given()) {
+    fit_to_pictures(outcome.picture, a.own.resize, a.own.path, own_matches);
+    const std::string note = left_out_note(own_matches, a.own.path);
+    if (!note.empty()) common.note(note);
+  }
   const bool has_truth = !a.truth.empty();
   Truth truth;
   if (has_truth) {
@@ -434,11 +445,13 @@ int reconstruct(Arguments& a) {
   for (const std::string& mask : common.options.masks.files()) files.keep(mask);
   for (const std::string& camera : a.cameras.files()) files.keep(camera_path(camera));
   files.keep(a.truth);
+  files.keep(a.own.path);
   files.require_own({"reconstruct", kFiles, {"result.json", "matches.png"}, {}});
   uint64_t total_ns = 0;
   {
     const Stopwatch watch(!common.quiet, watch_text(common.options));
-    total_ns = reconstruct_pair(session, common.options, outcome);
+    total_ns = a.own.given() ? estimate_own_matches(session, common.options, own_matches, outcome)
+                             : reconstruct_pair(session, common.options, outcome);
   }
   uint64_t dense_ns = 0;
 #ifdef TWOVIEW_HAS_DENSE
@@ -501,6 +514,10 @@ void add_reconstruct(CLI::App& program, Run& run) {
       ->check(CLI::Range(0, kMostDensePoints));
 #endif
   add_common(*verb, a->common, kAllOptions | kGravity, "folder for the results");
+  a->own.add_to(*verb,
+                "matches of A and B by another program, in place of twoview's: .npz, .npy, or a "
+                "table of x0 y0 x1 y1 and perhaps a score",
+                "FILE");
   verb->final_callback([a, &run] { run = [a] { return reconstruct(*a); }; });
 }
 

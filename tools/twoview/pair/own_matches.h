@@ -1,0 +1,46 @@
+// Matches of another program in the place of the library's: their option, their pixels in the
+// pictures as they are used, and the pose and points that they give.
+#pragma once
+
+#include <CLI/App.hpp>
+#include <cstdint>
+#include <string>
+
+#include "files/matches_file.h"
+#include "pair/options.h"
+#include "pair/result.h"
+#include "pair/session.h"
+
+namespace cli {
+
+struct OwnMatchOptions {
+  std::string path;  // of --matches; empty: the library finds the matches
+  // The longer side of the pictures that the other program matched, which were made smaller; 0: it
+  // matched them as they are; below 0: it is not said, and doubted where the matches look so.
+  int resize = -1;
+
+  bool given() const { return !path.empty(); }
+  // Adds --matches and --matches-resize, which exclude the options of corners, of descriptors and
+  // of their matching: call it after add_common. type: of the path.
+  void add_to(CLI::App& verb, const std::string& help, const std::string& type);
+  // Adds both to the options of a result.
+  void add_json(nlohmann::ordered_json& options) const;
+};
+
+// Moves the pixels of `matches` to the two pictures as they are used, which may be smaller than
+// their files; `name` is the file of the matches. Throws BadInput that names the first match that
+// is not finite or not in its picture; for normalised coordinates; and, where `resize` is below 0,
+// for matches that leave so much of both pictures empty that they are of smaller ones.
+void fit_to_pictures(const Picture pictures[2], int resize, const std::string& name,
+                     MatchList& matches);
+
+// Estimates from these matches and triangulates their inliers; fills outcome.two_view,
+// outcome.reconstruction and outcome.own, where the arrays of the reconstruction lie. Returns the
+// wall time of the library's calls in nanoseconds. Throws BadInput when the library refuses.
+uint64_t estimate_own_matches(Session& session, const Options& options, const MatchList& matches,
+                              Outcome& outcome);
+
+// A note on what was not used of the file; empty where there is nothing.
+std::string left_out_note(const MatchList& matches, const std::string& name);
+
+}  // namespace cli
