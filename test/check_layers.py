@@ -56,7 +56,9 @@ ROOMS = {
     "recording": {"pair", "files", "base"},
     "verbs": {"recording", "calibration", "report", "pictures", "pair", "files", "base"},
     "drone": {"sources", "recording", "files", "base"},
-    "odometry": {"sources", "drone", "recording", "report", "pictures", "pair", "files", "base"},
+    "room_model": {"report", "pictures", "pair", "files", "base"},
+    "odometry": {"room_model", "sources", "drone", "recording", "report", "pictures", "pair",
+                 "files", "base"},
     "simulate": {"drone", "files", "base"},
     "sources": {"base"},
 }

@@ -55,6 +55,9 @@ int run_program(int argc, char** argv) {
   cli::add_odometry(program, run);
   cli::add_map(program, run);
 #endif
+#ifdef TWOVIEW_HAS_ROOM
+  cli::add_room(program, run);
+#endif
 #ifdef TWOVIEW_HAS_DRONE
   cli::add_drone(program, run, kAddSimulate);
 #endif

@@ -137,6 +137,7 @@ class Flight {
   // Of all pixels that were found to stand still while the scene moved, in any frame: 0 in a
   // picture of 255, of the frames' size as they are tracked; empty where there were none.
   const cv::Mat& still_mask() const { return still_mask_; }
+  const Masks& masks() const { return options_.masks; }
   const std::vector<std::string>& mask_files() const { return options_.masks.files(); }
   int num_unreadable() const { return num_unreadable_; }
   const std::string& first_problem() const { return first_problem_; }

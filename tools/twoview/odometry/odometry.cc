@@ -19,10 +19,16 @@
 #include "odometry/live.h"
 #include "odometry/outputs.h"
 #include "odometry/report.h"
+#include "odometry/stored_source.h"
 #include "pair/options.h"
 #include "pair/result.h"
 #include "pair/session.h"
 #include "verbs/common.h"
+#ifdef TWOVIEW_HAS_ROOM
+#include "odometry/room_options.h"
+#include "room_model/page.h"
+#include "room_model/room_files.h"
+#endif
 #ifdef TWOVIEW_HAS_DRONE
 #include "odometry/drone_frames.h"
 #endif
@@ -42,6 +48,14 @@ const std::vector<std::string> kFiles = {"trajectory.txt", "live.txt",        "k
                                          kCameraFile,      "covariances.txt", kStillFile,
                                          "frames.csv",     "cloud.ply",       "map.twm",
                                          "report.html",    "result.json",     kEstimatedFile};
+// These, and those of a room.
+std::vector<std::string> own_files() {
+  std::vector<std::string> names = kFiles;
+#ifdef TWOVIEW_HAS_ROOM
+  names.insert(names.end(), kRoomFiles.begin(), kRoomFiles.end());
+#endif
+  return names;
+}
 const std::vector<std::string> kAlwaysFiles = {"frames.csv", "live.txt", "result.json"};
 const std::vector<std::string> kColmapFiles = {"cameras.txt", "images.txt", "points3D.txt"};
 
@@ -55,6 +69,10 @@ struct Arguments {
   bool has_resize = false;  // --resize is given, if only as 0
   int32_t live_port = 0;
   FlightOptions flight;
+#ifdef TWOVIEW_HAS_ROOM
+  bool makes_room = false;
+  RoomSettings room;
+#endif
 #ifdef TWOVIEW_HAS_DRONE
   DroneAddress drone;  // without a host: none
   VehicleAddress vehicle;
@@ -83,15 +101,6 @@ void require_camera_of_live(const Arguments& a, const char* why) {
         "a film first, and give the estimated_camera.yaml of its odometry as --camera");
 }
 
-std::unique_ptr<FrameSource> open_recording_folder(const Arguments& a) {
-#ifdef TWOVIEW_HAS_DRONE
-  require_camera(a, "a recording of a drone does not describe its camera");
-  return open_recording(a.source, a.camera);
-#else
-  throw BadInput("cannot read " + a.source + ": this program was built without the drone's driver");
-#endif
-}
-
 std::unique_ptr<FrameSource> open_source(const Arguments& a) {
 #ifdef TWOVIEW_HAS_DRONE
   if (!a.drone.host.empty()) {
@@ -113,16 +122,11 @@ std::unique_ptr<FrameSource> open_source(const Arguments& a) {
     return open_camera(a.source);
   }
 #endif
-  std::error_code error;
-  const fs::path path = a.source;
-  if (fs::is_directory(path, error)) {
-    const bool is_recording =
-        fs::exists(path / "video.pave", error) || fs::exists(path / "vehicle.tlog", error);
-    if (!is_recording) return open_image_folder(a.source, a.fps, !a.ignores_imu);
-    if (a.fps > 0) throw BadInput("--fps: a recording of a drone has times");
-    return open_recording_folder(a);
-  }
-  if (fs::is_regular_file(path, error)) return open_film(a.source, a.fps);
+#ifdef TWOVIEW_HAS_DRONE
+  if (is_recording_folder(a.source) && !(a.fps > 0))
+    require_camera(a, "a recording of a drone does not describe its camera");
+#endif
+  if (auto source = open_stored_source(a.source, a.fps, !a.ignores_imu, a.camera)) return source;
   if (is_number(a.source)) {
     require_camera_of_live(a, "a camera does not describe its lens");
     if (a.fps > 0) throw BadInput("--fps: the frames of a camera have times");
@@ -200,6 +204,10 @@ nlohmann::ordered_json options_of(const Arguments& a, const std::string& truth_f
   if (is_auto(a)) json["focal_35mm"] = "auto";
   if (a.flight.focal_35mm > 0) json["focal_35mm"] = a.flight.focal_35mm;
   json["truth"] = text_or_null(truth_file);
+#ifdef TWOVIEW_HAS_ROOM
+  json["room"] = nullptr;
+  if (a.makes_room) json["room"] = room_options_json(a.room);
+#endif
   return json;
 }
 
@@ -221,8 +229,53 @@ std::string estimated_camera_text(const FilmLens& lens) {
   return camera_yaml(lens.camera()) + text;
 }
 
+// The room of a flight as files, words and a part of the page; empty where none is made.
+struct FlightRoom {
+  std::string html, script, summary;  // of the page, and lines
+#ifdef TWOVIEW_HAS_ROOM
+  RoomScene scene;
+  std::optional<RoomModel> model;
+#endif
+};
+
+#ifdef TWOVIEW_HAS_ROOM
+// What goes wrong with the room is noted, and the flight's results are written all the same.
+FlightRoom room_of(Arguments& a, FrameSource& source, FlightResult& result,
+                   const std::atomic<bool>& stop) {
+  FlightRoom room;
+  result.json["room"] = nullptr;
+  if (!a.makes_room) return room;
+  room.scene = room_scene(result);
+  if (room.scene.views.empty()) {
+    a.common.note("no room: no frame has a pose");
+    return room;
+  }
+  try {
+    RoomBuilder builder(room.scene, a.room);
+    const Flight& flight = *result.flight;
+    read_pictures_with_progress(source, flight.masks(), flight.still_mask(), builder, stop,
+                                !a.common.quiet);
+    room.model = finish_with_progress(builder, !a.common.quiet);
+    room.scene = builder.scene();
+  } catch (const BadInput& e) {
+    a.common.note(std::string("no room: ") + e.what());
+    return room;
+  }
+  for (const std::string& note : room_notes(*room.model, stop)) a.common.note(note);
+  if (const int count = result.json["num_segments"].get<int>(); count > 1)
+    a.common.note("the room is of the longest of " + std::to_string(count) +
+                  " segments, whose units and places do not compare");
+  result.json["room"] = room_json(room.scene, *room.model);
+  const RoomSection section = room_section(room.scene, *room.model);
+  room.html = section.html;
+  room.script = section.script;
+  room.summary = room_summary(room.scene, *room.model);
+  return room;
+}
+#endif
+
 void make_files(const FlightResult& result, const std::optional<FilmLens>& lens,
-                const std::string& name, OutputSet& files) {
+                const std::string& name, const FlightRoom& room, OutputSet& files) {
   const Flight& flight = *result.flight;
   if (lens && !lens->is_uncertain && !files.is_input(kEstimatedFile))
     files.add(kEstimatedFile, estimated_camera_text(*lens));
@@ -230,7 +283,10 @@ void make_files(const FlightResult& result, const std::optional<FilmLens>& lens,
   files.add("frames.csv", frames_csv(flight));
   files.add("trajectory.txt", trajectory_text(flight, false));
   files.add("live.txt", trajectory_text(flight, true));
-  files.add("report.html", flight_report(result, name));
+  files.add("report.html", flight_report(result, name, room.html, room.script));
+#ifdef TWOVIEW_HAS_ROOM
+  if (room.model) add_room_files(room.scene, *room.model, files);
+#endif
   if (flight.has_corrected_camera() && !files.is_input(kCameraFile))
     files.add(kCameraFile, camera_yaml(flight.corrected_file_camera()));
   if (!flight.still_mask().empty() && !files.is_input(kStillFile))
@@ -291,7 +347,7 @@ std::string still_note(const FlightResult& result) {
 
 std::string summary(const FlightResult& result, const std::optional<FilmLens>& lens,
                     const FrameSource& source, const OutputSet& files, bool has_colmap,
-                    const std::string& notes) {
+                    const std::string& notes, const std::string& room) {
   const nlohmann::ordered_json& j = result.json;
   std::string text =
       summary_line("source", "%s, %d frames", source.kind().c_str(), j["num_frames"].get<int>());
@@ -347,6 +403,7 @@ std::string summary(const FlightResult& result, const std::optional<FilmLens>& l
         "work", "%.2f ms a frame (mean), %.2f ms (max) with %s kernels in %.1f MiB",
         j["time_ms"]["mean"].get<double>(), j["time_ms"]["max"].get<double>(),
         j["kernels"].get<std::string>().c_str(), j["context_bytes"].get<double>() / (1 << 20));
+  text += room;
   std::string names;
   for (const std::string& name : files.names()) names += " " + name;
   return text + summary_line("files", "%s:%s%s", files.folder().c_str(), names.c_str(),
@@ -407,6 +464,12 @@ int odometry(Arguments& a) {
   if (a.flight.focal_35mm != 0 && !a.camera.empty())
     throw BadInput("--focal-35mm is for films and photographs without a camera file");
   const std::unique_ptr<FrameSource> source = open_source(a);
+#ifdef TWOVIEW_HAS_ROOM
+  if (a.makes_room && !source->can_run_again())
+    throw BadInput(
+        "--room reads the pictures a second time, which a live source does not allow: record them "
+        "first");
+#endif
   const std::string truth_file = a.truth.empty() ? source->truth_file() : a.truth;
   std::optional<TruePoses> truth;
   if (!truth_file.empty())
@@ -418,7 +481,7 @@ int odometry(Arguments& a) {
   for (const std::string& name : source->files()) files.keep(name);
   files.keep(camera_path(a.camera));
   files.keep(truth_file);
-  std::vector<std::string> names = kFiles;
+  std::vector<std::string> names = own_files();
   for (const std::string& name : kColmapFiles) names.push_back("colmap/" + name);
   files.require_own({"odometry", names, kAlwaysFiles, {}});
   const int wanted = num_wanted(*source, a.flight);
@@ -461,6 +524,13 @@ int odometry(Arguments& a) {
                                   wanted < 0 ? static_cast<int>(flight.frames().size()) : wanted);
   if (!result.truth_note.empty()) common.note(result.truth_note);
   if (!flight.still_mask().empty()) common.note(still_note(result));
+#ifdef TWOVIEW_HAS_ROOM
+  const FlightRoom room = room_of(a, *source, result, stop);
+  std::optional<DepthFolder> depth;
+  if (room.model) depth.emplace(files.folder(), *room.model);
+#else
+  const FlightRoom room;
+#endif
   result.json["focal_length"] = lens ? lens->json() : nlohmann::ordered_json(nullptr);
   result.json["film"] = film_json(film);
   result.json["notes"] = common.notes;
@@ -471,7 +541,7 @@ int odometry(Arguments& a) {
   result.json["version"] = tv_version_string();
   result.json["kernels"] = session.kernels();
   const std::string name = fs::absolute(fs::path(a.source) / "x").parent_path().filename().string();
-  make_files(result, lens, a.source.empty() ? source->kind() : name, files);
+  make_files(result, lens, a.source.empty() ? source->kind() : name, room, files);
   const bool has_map = !result.keyframes.empty();
   const fs::path colmap_folder = files.folder() / "colmap";
   std::optional<OutputSet> colmap;  // without a map, to remove an earlier run's files
@@ -482,9 +552,12 @@ int odometry(Arguments& a) {
   }
   if (common.json) print(json_text(result.json));
   const std::string notes = common.note_lines();
-  if (common.speaks()) print(summary(result, lens, *source, files, has_map, notes));
+  if (common.speaks()) print(summary(result, lens, *source, files, has_map, notes, room.summary));
   files.commit();
-  files.remove_others(kFiles);
+  files.remove_others(own_files());
+#ifdef TWOVIEW_HAS_ROOM
+  if (depth) depth->commit();
+#endif
   if (colmap) {
     colmap->commit();
     colmap->remove_others(kColmapFiles);
@@ -539,6 +612,11 @@ void add_odometry(CLI::App& program, Run& run) {
                                    "scale frames down to this longer side, pixels; 0: as they are");
   add_mask(*verb, a->flight.masks);
   add_kernels(*verb, o.kernels);
+#ifdef TWOVIEW_HAS_ROOM
+  CLI::Option* room = verb->add_flag("--room", a->makes_room,
+                                     "make the surface of the room as well, as twoview room does");
+  for (CLI::Option* option : add_room_options(*verb, a->room)) option->needs(room);
+#endif
 #ifdef TWOVIEW_HAS_DRONE
   verb->add_option("--drone", a->drone.host, "in place of SOURCE: the address of an AR.Drone")
       ->type_name("HOST");

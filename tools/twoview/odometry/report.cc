@@ -325,7 +325,8 @@ std::string data_element(const char* id, const Json& json) {
 
 }  // namespace
 
-std::string flight_report(const FlightResult& result, const std::string& name) {
+std::string flight_report(const FlightResult& result, const std::string& name,
+                          const std::string& room_html, const std::string& room_script) {
   Json data;
   for (int32_t s = 0; s < TV_ODOMETRY_NUM_STATUSES; ++s)
     data["statuses"].push_back(tv_odometry_status_string(static_cast<tv_odometry_status>(s)));
@@ -336,7 +337,8 @@ std::string flight_report(const FlightResult& result, const std::string& name) {
   if (!result.points.empty())
     script += data_element("cloud-data", cloud_json(result)) + "<script>\n" + kReportScript +
               "</script>\n";
-  script += data_element("flight-data", data) + "<script>\n" + kFlightScript + "</script>\n";
+  script += room_script + data_element("flight-data", data) + "<script>\n" + kFlightScript +
+            "</script>\n";
   const Headline head = headline(result);
   return filled(kFlightPage, {{"title", escaped(name) + ": twoview odometry"},
                               {"style", std::string(kReportStyle) + kFlightStyle},
@@ -347,6 +349,7 @@ std::string flight_report(const FlightResult& result, const std::string& name) {
                               {"notes", bullets("notes", result.json["notes"])},
                               {"cards", cards(result)},
                               {"cloud", cloud_section(result)},
+                              {"room", room_html},
                               {"keyframes", keyframes_section(data["keyframes"])},
                               {"json", escaped(json_text(result.json))},
                               {"version", tv_version_string()},

@@ -8,6 +8,8 @@
 namespace cli {
 
 // `name`: of the source, for the heading.
-std::string flight_report(const FlightResult& result, const std::string& name);
+// room_html, room_script: a section on the room, and the scripts that it needs; may be empty.
+std::string flight_report(const FlightResult& result, const std::string& name,
+                          const std::string& room_html, const std::string& room_script);
 
 }  // namespace cli

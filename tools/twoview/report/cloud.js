@@ -1,5 +1,5 @@
-// An interactive view of a point cloud: dragging rotates it. Plain canvas: no library, no network,
-// no GPU needed. The page gives an element #cloud-data with JSON {points, colours, cameras}; points
+// An interactive view of a point cloud: dragging rotates it (gestures.js). Plain canvas: no library,
+// no network, no GPU needed. The page gives an element #cloud-data with JSON {points, colours, cameras}; points
 // and colours are base64. It may give paths, each {points, colour} with points x y z one after the
 // other; a colour of a camera; and the names of the axes. After a change of these it sends the event
 // "cloud-changed" to the window.
@@ -162,42 +162,24 @@
     if (!frame) frame = window.requestAnimationFrame(function () { frame = 0; draw(); });
   }
 
-  let held = new Map();
-  canvas.addEventListener("pointerdown", function (event) {
-    turning = false;
-    moved = true;
-    canvas.setPointerCapture(event.pointerId);
-    held.set(event.pointerId, [event.clientX, event.clientY]);
-  });
-  canvas.addEventListener("pointermove", function (event) {
-    const last = held.get(event.pointerId);
-    if (!last) return;
-    const dx = event.clientX - last[0], dy = event.clientY - last[1];
-    if (held.size === 2) {
-      const other = [...held].find(([id]) => id !== event.pointerId)[1];
-      const before = Math.hypot(last[0] - other[0], last[1] - other[1]);
-      const after = Math.hypot(event.clientX - other[0], event.clientY - other[1]);
-      if (before > 0) zoom(after / before);
-    } else if (event.shiftKey || event.buttons & 6) {
+  window.twoviewGestures(canvas, {
+    hold: function () {
+      turning = false;
+      moved = true;
+    },
+    turn: function (dx, dy) {
+      pose.yaw += 0.007 * dx;
+      pose.pitch = Math.max(-1.57, Math.min(1.57, pose.pitch - 0.007 * dy));
+      request();
+    },
+    shift: function (dx, dy) {
       const focal = 1.05 * Math.min(canvas.clientWidth, 1.6 * canvas.clientHeight);
       pose.x += dx / focal;
       pose.y += dy / focal;
-    } else {
-      pose.yaw += 0.007 * dx;
-      pose.pitch = Math.max(-1.57, Math.min(1.57, pose.pitch - 0.007 * dy));
-    }
-    held.set(event.pointerId, [event.clientX, event.clientY]);
-    request();
+      request();
+    },
+    zoom: zoom,
   });
-  ["pointerup", "pointercancel"].forEach((name) =>
-    canvas.addEventListener(name, (event) => held.delete(event.pointerId)));
-  canvas.addEventListener("contextmenu", (event) => event.preventDefault());
-  canvas.addEventListener("wheel", function (event) {
-    event.preventDefault();
-    turning = false;
-    moved = true;
-    zoom(Math.exp(-0.0012 * event.deltaY));
-  }, { passive: false });
   function zoom(factor) {
     pose.zoom = Math.max(0.15, Math.min(40, pose.zoom * factor));
     request();

@@ -1,0 +1,311 @@
+#!/usr/bin/env python3
+"""Tests of `twoview room` on the rendered flight past five walls of test_odometry: where the walls
+are is known exactly. Files are read by this test's own readers, and by trimesh where it is
+installed."""
+import json
+import math
+import os
+import re
+import resource
+import shutil
+import struct
+import subprocess
+import tempfile
+import unittest
+from pathlib import Path
+
+from cli_support import CliTest, main, png
+from test_odometry import CAMERAS, COUNT, FOCAL, PICTURES, SHIFTS, TIMES, TUM_TRUTH, poses
+
+STEP = 0.1  # units of the truth between two frames
+DEPTHS = [FOCAL * STEP / shift for shift in SHIFTS]  # of the walls
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+# Runs in the page: stands where the camera was in the middle of its path, turns until a wall is in
+# the middle of the picture, and measures across it as a user does, with clicks.
+PROBE = """<script>
+  const viewer = window.roomViewer, canvas = document.getElementById("room");
+  const x = canvas.clientWidth / 2, y = canvas.clientHeight / 2, found = {hits: 0};
+  document.getElementById("room-walk").click();
+  viewer.view.pitch = 0;
+  for (let k = 0; k < 64; ++k) {
+    viewer.view.yaw = k * Math.PI / 32;
+    const hit = viewer.pick(x, y);
+    if (!hit) continue;
+    const ahead = [Math.cos(viewer.view.yaw), Math.sin(viewer.view.yaw), 0];
+    const facing = -hit.normal.reduce((sum, n, i) => sum + n * ahead[i], 0);
+    const depth = hit.place.reduce((sum, p, i) => sum + (p - viewer.view.eye[i]) * ahead[i], 0);
+    if (facing > (found.facing || 0)) Object.assign(found, {facing, depth, yaw: viewer.view.yaw});
+    ++found.hits;
+  }
+  viewer.view.yaw = found.yaw;
+  viewer.draw();
+  const pixels = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
+  found.lit = 0;
+  for (let i = 0; i < pixels.length; i += 4) found.lit += pixels[i] > 60;
+  viewer.click(x - 20, y);
+  viewer.click(x + 20, y);
+  found.readout = document.getElementById("room-readout").textContent;
+  found.size = [canvas.width, canvas.height];
+  document.title = JSON.stringify(found);
+</script>"""
+TYPES = {"float": "f", "uchar": "B", "int": "i"}
+
+
+def read_ply(path):
+    """(the properties of the vertices, a list of rows, a list of triangles) of a room.ply."""
+    head, _, body = path.read_bytes().partition(b"end_header\n")
+    lines = head.decode().splitlines()
+    assert lines[:2] == ["ply", "format binary_little_endian 1.0"], lines
+    counts = {line.split()[1]: int(line.split()[2]) for line in lines if line.startswith("element")}
+    kinds = [line.split() for line in lines if line.startswith("property") and "list" not in line]
+    assert "property list uchar int vertex_indices" in lines, lines
+    row = struct.Struct("<" + "".join(TYPES[kind] for _, kind, _ in kinds))
+    names = [name for *_, name in kinds]
+    size = row.size * counts["vertex"]
+    assert len(body) == size + 13 * counts["face"], "the file's length is not what it promises"
+    vertices = [dict(zip(names, numbers)) for numbers in row.iter_unpack(body[:size])]
+    faces = [face[1:] for face in struct.iter_unpack("<B3i", body[size:]) if face[0] == 3]
+    assert len(faces) == counts["face"]
+    return names, vertices, faces
+
+
+def read_glb(data):
+    """(JSON, buffer) of a GLB; checks its chunks."""
+    magic, version, length = struct.unpack("<4sII", data[:12])
+    assert (magic, version, length) == (b"glTF", 2, len(data))
+    size, kind = struct.unpack("<I4s", data[12:20])
+    assert kind == b"JSON" and size % 4 == 0
+    start = 20 + size
+    buffer_size, kind = struct.unpack("<I4s", data[start:start + 8])
+    assert kind == b"BIN\0" and start + 8 + buffer_size == len(data)
+    return json.loads(data[20:start]), data[start + 8:]
+
+
+class RoomTest(CliTest):
+    @classmethod
+    def setUpClass(cls):
+        """The set folder and the odometry's results, which the tests only read."""
+        super().setUpClass()
+        cls.shared = Path(tempfile.mkdtemp(prefix="twoview_room_"))
+        cls.addClassCleanup(shutil.rmtree, cls.shared, ignore_errors=True)
+        cls.source, cls.flight = cls.shared / "set", cls.shared / "flight"
+        (cls.source / "images").mkdir(parents=True)
+        for i, data in enumerate(PICTURES):
+            (cls.source / f"images/{i:05}.png").write_bytes(data)
+        (cls.source / "frames.txt").write_text("".join(
+            f"{t:.9f} images/{i:05}.png\n" for i, t in enumerate(TIMES)))
+        (cls.source / "cameras.yaml").write_text(CAMERAS)
+        (cls.source / "groundtruth.txt").write_text(TUM_TRUTH)
+
+    def setUp(self):
+        super().setUp()
+        if not self.flight.exists():
+            self.succeed(self.run_program("odometry", self.source, "-o", self.flight))
+
+    def room(self, *more, folder=None, out=None, **options):
+        return self.run_program("room", folder or self.flight, "-o", out or self.out, *more,
+                                **options)
+
+    def scale(self):
+        """Units of the truth in one of the odometry's."""
+        path, _ = poses(self.flight / "trajectory.txt")
+        first, last = path[min(path)], path[max(path)]
+        return STEP * (COUNT - 1) / math.dist(first[:3], last[:3])
+
+    # -- a whole run --------------------------------------------------------------------------
+
+    def test_the_walls_are_where_they_are(self):
+        done = self.succeed(self.room())
+        self.assertIn("triangles", done.stdout.decode())
+        names, vertices, faces = read_ply(self.out / "room.ply")
+        self.assertEqual(names, ["x", "y", "z", "nx", "ny", "nz", "red", "green", "blue", "sigma",
+                                 "inferred"])
+        room = self.result()["room"]
+        self.assertEqual((room["num_vertices"], room["num_triangles"]), (len(vertices), len(faces)))
+        self.assertGreater(len(faces), 2000)
+        self.assertEqual(sorted(set(index for face in faces for index in face)),
+                         list(range(len(vertices))), "each vertex is of a triangle")
+        scale, right, normals = self.scale(), 0, 0
+        for v in vertices:
+            # The camera's path is along x of the first camera, to within the odometry's error.
+            off = min(abs(scale * v["z"] - depth) / depth for depth in DEPTHS)
+            right += off < 0.03
+            normals += v["nz"] < -0.5  # towards the camera
+            self.assertAlmostEqual(math.hypot(v["nx"], v["ny"], v["nz"]), 1, 3)
+            self.assertGreater(v["sigma"], 0)
+        self.assertGreater(right / len(vertices), 0.85)
+        self.assertGreater(normals / len(vertices), 0.85)
+        nearest = {min(DEPTHS, key=lambda depth: abs(scale * v["z"] - depth)) for v in vertices}
+        self.assertGreaterEqual(len(nearest), 4, "nearly all of the walls are there")
+
+    def test_result_json_says_what_was_made(self):
+        self.succeed(self.room("--depth-maps"))
+        result = self.result()
+        room = result["room"]
+        for key in ("num_vertices", "num_triangles", "voxel", "size", "share_inferred",
+                    "keyframes_used", "ms_per_keyframe", "memory_bytes", "truth"):
+            self.assertIn(key, room)
+        self.assertEqual(sorted(room["ms_per_keyframe"]), ["depth", "fusion", "mesh"])
+        self.assertEqual(room["memory_bytes"], 64 << 20)
+        self.assertEqual((room["share_inferred"], room["truth"]), (0, None))
+        self.assertAlmostEqual(sum(room["pixels"].values()), 1, 6)
+        self.assertGreater(room["pixels"]["measured"], 0.3)
+        self.assertEqual(len(os.listdir(self.out / "depth")), room["keyframes_used"])
+        self.assertGreater(room["depth_maps"]["grey_levels_per_unit"], 0)
+        # A run without them removes them.
+        self.succeed(self.room())
+        self.assertNotIn("depth", self.listing())
+
+    def test_two_runs_write_the_same_bytes(self):
+        self.succeed(self.room())
+        other = self.folder / "other"
+        self.succeed(self.room(out=other))
+        for name in ("room.ply", "room.glb"):
+            self.assertEqual((self.out / name).read_bytes(), (other / name).read_bytes(), name)
+
+    def test_the_glb_holds_the_same_surface_with_y_up(self):
+        self.succeed(self.room())
+        _, vertices, faces = read_ply(self.out / "room.ply")
+        gltf, buffer = read_glb((self.out / "room.glb").read_bytes())
+        self.assertEqual(gltf["asset"]["version"], "2.0")
+        self.assertEqual(len(buffer), gltf["buffers"][0]["byteLength"])
+        self.assertNotIn("uri", gltf["buffers"][0])
+        primitive = gltf["meshes"][0]["primitives"][0]
+        self.assertEqual(sorted(primitive["attributes"]), ["COLOR_0", "NORMAL", "POSITION",
+                                                           "_SIGMA"])
+        kinds = {5123: "H", 5125: "I", 5126: "f"}
+        sizes = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
+
+        def numbers(index):
+            accessor = gltf["accessors"][index]
+            view = gltf["bufferViews"][accessor["bufferView"]]
+            row = struct.Struct("<" + sizes[accessor["type"]] * kinds[accessor["componentType"]])
+            self.assertEqual(view["byteLength"], row.size * accessor["count"])
+            self.assertEqual(view["byteOffset"] % 4, 0)
+            return list(row.iter_unpack(buffer[view["byteOffset"]:][:view["byteLength"]]))
+
+        positions = numbers(primitive["attributes"]["POSITION"])
+        self.assertEqual(len(positions), len(vertices))
+        self.assertEqual(len(numbers(primitive["indices"])), 3 * len(faces))
+        self.assertEqual({c[3] for c in numbers(primitive["attributes"]["COLOR_0"])}, {65535})
+        accessor = gltf["accessors"][primitive["attributes"]["POSITION"]]
+        self.assertEqual(accessor["max"], [max(p[k] for p in positions) for k in range(3)])
+        # Without gravity the cameras say where up is: against their y axis.
+        heights = [p[1] + v["y"] for p, v in zip(positions, vertices)]
+        self.assertLess(max(heights) - min(heights), 0.1 * (accessor["max"][1] -
+                                                            accessor["min"][1]))
+        try:
+            import trimesh
+        except ImportError:
+            return
+        mesh = trimesh.load(self.out / "room.glb", force="mesh")
+        self.assertEqual((len(mesh.vertices), len(mesh.faces)), (len(vertices), len(faces)))
+
+    def test_odometry_makes_the_room_at_once(self):
+        self.succeed(self.room())
+        apart = self.result()["room"]
+        both = self.folder / "both"
+        done = self.succeed(self.run_program("odometry", self.source, "-o", both, "--room"))
+        self.assertIn("triangles", done.stdout.decode())
+        at_once = self.result(both)["room"]
+        self.assertEqual(at_once["keyframes_used"], apart["keyframes_used"])
+        # The poses that the files hold are rounded.
+        self.assertAlmostEqual(at_once["num_triangles"] / apart["num_triangles"], 1, delta=0.05)
+        for name in ("room.ply", "room.glb", "plan.svg", "plan.png", "trajectory.txt"):
+            self.assertTrue((both / name).exists(), name)
+        self.assertIn('id="room-data"', (both / "report.html").read_text())
+        # A run without it leaves nothing of it.
+        self.succeed(self.run_program("odometry", self.source, "-o", both))
+        self.assertNotIn("room.ply", self.listing(both))
+        self.assertIsNone(self.result(both)["room"])
+        self.one_line(self.run_program("odometry", self.source, "-o", both, "--voxel", "0.1"),
+                      "--room")
+
+    def test_the_plan_has_the_walls_and_a_scale(self):
+        self.succeed(self.room())
+        svg = (self.out / "plan.svg").read_text()
+        self.assertTrue(svg.startswith("<svg ") and svg.endswith("</svg>\n"))
+        self.assertIn("polyline", svg)
+        self.assertIn("of floor", svg)
+        self.assertGreater(self.result()["room"]["floor_area"], 0)
+        self.assertEqual((self.out / "plan.png").read_bytes()[:4], b"\x89PNG")
+
+    @unittest.skipUnless(CHROMIUM, "there is no Chromium")
+    def test_the_page_shows_the_surface_and_measures(self):
+        self.succeed(self.room())
+        text = (self.out / "report.html").read_text()
+        page = self.write("page.html", text.replace("</body>", PROBE + "</body>"))
+        done = subprocess.run(
+            [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--window-size=1000,800",
+             "--virtual-time-budget=4000", f"--user-data-dir={self.folder}/profile", "--dump-dom",
+             page.as_uri()], capture_output=True, timeout=120)
+        title = re.search(r"<title>(.*?)</title>", done.stdout.decode()).group(1)
+        found = json.loads(title)
+        self.assertGreater(found["hits"], 3)
+        self.assertGreater(found["facing"], 0.9)
+        # The wall in the middle of the picture.
+        self.assertAlmostEqual(self.scale() * found["depth"], DEPTHS[2], delta=0.06 * DEPTHS[2])
+        self.assertGreater(found["lit"], 2000)
+        number, sigma = re.match(r"([\d.]+) \u00b1 ([\d.]+) ", found["readout"]).groups()
+        width, height = found["size"]
+        expected = 40 / (0.62 * min(width, 1.5 * height)) * found["depth"]
+        self.assertAlmostEqual(float(number), expected, delta=0.05 * expected)
+        self.assertGreater(float(sigma), 0)
+        self.assertIn("not the metre", found["readout"])
+
+    # -- memory and voxels --------------------------------------------------------------------
+
+    def test_a_room_that_does_not_fit_gets_coarser_and_says_so(self):
+        done = self.succeed(self.room("--voxel", "0.02", "--max-memory", "1"))
+        room = self.result()["room"]
+        self.assertEqual(room["first_voxel"], 0.02)
+        self.assertGreaterEqual(room["voxel"], 0.04)
+        self.assertIn("memory was full", done.stdout.decode())
+        self.assertEqual(room["memory_bytes"], 1 << 20)
+
+    # -- bad input ----------------------------------------------------------------------------
+
+    def test_a_folder_that_odometry_did_not_write(self):
+        self.assert_refused(self.room(folder=self.source), "result.json")
+        self.write("other/result.json", '{"R": null}')
+        self.assert_refused(self.room(folder=self.folder / "other"), "not of twoview odometry")
+        self.write("other/result.json", "no json")
+        self.assert_refused(self.room(folder=self.folder / "other"), "not of twoview odometry")
+
+    def test_a_source_that_has_gone_or_moved(self):
+        moved = self.folder / "moved"
+        shutil.copytree(self.source, moved)
+        shutil.copytree(self.flight, self.folder / "flight")
+        result = json.loads((self.folder / "flight/result.json").read_text())
+        result["source"] = str(self.folder / "gone")
+        self.write("flight/result.json", json.dumps(result))
+        self.assert_refused(self.room(folder=self.folder / "flight"), "gone", "--source")
+        self.succeed(self.room("--source", moved, folder=self.folder / "flight"))
+        shutil.rmtree(moved / "images")
+        other = self.folder / "other"
+        self.assert_refused(self.room("--source", moved, folder=self.folder / "flight", out=other),
+                            "picture", out=other)
+
+    def test_pictures_of_another_size_are_refused(self):
+        moved = self.folder / "moved"
+        shutil.copytree(self.source, moved)
+        for i in range(COUNT):
+            (moved / f"images/{i:05}.png").write_bytes(png(160, 120, bytes(160 * 120)))
+        (moved / "cameras.yaml").unlink()
+        self.assert_refused(self.room("--source", moved), "320x240")
+
+    def test_results_of_another_verb_stay(self):
+        self.one_line(self.room(out=self.flight), "give another -o")
+        self.assertIn("longest_segment", (self.flight / "result.json").read_text())
+
+    def test_a_full_disk_is_one_line(self):
+        def limit():
+            resource.setrlimit(resource.RLIMIT_FSIZE, (30000, 30000))
+        done = self.room("--quiet", preexec_fn=limit)
+        self.assertEqual(done.returncode, 2)
+        self.one_line(done, "cannot write")
+        self.assertFalse(self.out.exists(), "something was written")
+
+
+if __name__ == "__main__":
+    main()

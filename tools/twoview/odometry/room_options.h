@@ -1,0 +1,42 @@
+// What `twoview room` and `twoview odometry --room` have in common: options, progress, notes.
+#pragma once
+
+#include <CLI/App.hpp>
+#include <atomic>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/output.h"
+#include "odometry/frames.h"
+#include "odometry/room_source.h"
+#include "room_model/builder.h"
+
+namespace cli {
+
+// --voxel, --max-memory, --measured-only and --depth-maps; the options that were added.
+std::vector<CLI::Option*> add_room_options(CLI::App& verb, RoomSettings& settings);
+nlohmann::ordered_json room_options_json(const RoomSettings& settings);
+
+// read_room_pictures with a progress line on a terminal.
+void read_pictures_with_progress(FrameSource& source, const Masks& masks, const cv::Mat& still,
+                                 RoomBuilder& builder, const std::atomic<bool>& stop, bool speaks);
+RoomModel finish_with_progress(RoomBuilder& builder, bool speaks);
+
+// What the user must know of the model, as lines without an end.
+std::vector<std::string> room_notes(const RoomModel& model, bool was_stopped);
+
+// The folder depth/ of the results, with the model's depth maps; without any, those of an earlier
+// run are removed.
+class DepthFolder {
+ public:
+  DepthFolder(const std::filesystem::path& results, const RoomModel& model);
+  void commit();
+
+ private:
+  std::filesystem::path path_;
+  std::optional<OutputSet> files_;
+};
+
+}  // namespace cli

@@ -1,0 +1,267 @@
+#include "odometry/room_source.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <opencv2/imgproc.hpp>
+#include <set>
+
+#include "base/error.h"
+#include "base/output.h"
+#include "files/camera_formats.h"
+#include "files/image_file.h"
+#include "odometry/numbers.h"
+#include "odometry/stored_source.h"
+
+namespace cli {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+constexpr size_t kMaxFileBytes = 1 << 28;
+
+Json flight_result(const std::string& path) {
+  const Json json = Json::parse(read_file(path, kMaxFileBytes), nullptr, false);
+  if (!json.is_object() || !json.contains("longest_segment") || !json.contains("source") ||
+      !json.contains("options"))
+    throw BadInput(path + " is not of twoview odometry");
+  return json;
+}
+
+// A pose of a file of `twoview odometry`.
+struct SegmentPose {
+  std::string time;  // as the file writes it, so that it can be compared with other files'
+  int segment = 0;
+  Pose pose;
+};
+
+std::vector<SegmentPose> read_poses(const std::string& path) {
+  std::vector<SegmentPose> poses;
+  const std::string text = read_file(path, kMaxFileBytes);
+  int segment = 0, number = 0;
+  for (size_t at = 0; at < text.size();) {
+    const size_t end = std::min(text.find('\n', at), text.size());
+    const std::string line = text.substr(at, end - at);
+    at = end + 1;
+    ++number;
+    const std::vector<std::string_view> words = words_of(line, ":");
+    if (words.size() > 2 && words[0] == "#" && words[1] == "segment") {
+      double value = 0;
+      if (to_number(words[2], value)) segment = static_cast<int>(value);
+    }
+    if (words.empty() || words[0][0] == '#') continue;
+    double n[8];
+    bool good = words.size() == 8;
+    for (size_t k = 0; good && k < 8; ++k) good = to_number(words[k], n[k]);
+    if (!good) throw BadInput(path + ": line " + std::to_string(number) + " is no pose");
+    SegmentPose pose{std::string(words[0]), segment, {}};
+    pose.pose = {rotation_of_quaternion(n[4], n[5], n[6], n[7]), {n[1], n[2], n[3]}};
+    poses.push_back(pose);
+  }
+  return poses;
+}
+
+std::vector<Vector3> read_colmap_points(const std::string& path) {
+  std::vector<Vector3> points;
+  const std::string text = read_file(path, kMaxFileBytes);
+  for (const TextLine& line : lines_of(text)) {
+    const std::vector<std::string_view> words = words_of(line.text);
+    Vector3 p{};
+    bool good = words.size() >= 8;
+    for (size_t k = 0; good && k < 3; ++k) good = to_number(words[k + 1], p[k]);
+    if (!good) throw BadInput(path + ": line " + std::to_string(line.number) + " is no point");
+    points.push_back(p);
+  }
+  return points;
+}
+
+// The source's index of each frame whose pose frames.csv knows, with its time: the frames are every
+// K-th of the source.
+std::map<std::string, std::pair<int, std::string>> frames_by_time(const std::string& path,
+                                                                  int every) {
+  std::map<std::string, std::pair<int, std::string>> frames;
+  const std::string text = read_file(path, kMaxFileBytes);
+  int index = -every;
+  for (const TextLine& line : lines_of(text)) {
+    const size_t comma = line.text.find(',');
+    if (comma == std::string_view::npos) throw BadInput(path + " is not of twoview odometry");
+    if (line.text.substr(0, comma) == "timestamp") continue;
+    index += every;
+    const std::string_view rest = line.text.substr(comma + 1);
+    const std::string name(rest.substr(0, rest.find(',')));
+    frames[std::string(line.text.substr(0, comma))] = {index, name};
+  }
+  return frames;
+}
+
+// The first frame whose picture can be read.
+SourceFrame first_frame(FrameSource& source, const std::set<int>& wanted) {
+  SourceFrame first;
+  std::string problem;
+  const std::atomic<bool> never{false};
+  source.run([&wanted](int index) { return wanted.count(index) != 0; },
+             [&](const SourceFrame& frame) {
+               first = frame;
+               first.luma = frame.luma.clone();
+               if (problem.empty()) problem = frame.problem;
+               return frame.luma.empty();
+             },
+             never);
+  if (first.luma.empty())
+    throw BadInput("no picture of the source can be read" +
+                   (problem.empty() ? std::string() : ": " + problem));
+  return first;
+}
+
+// The camera by which the frames were tracked, for the pictures as the source gives them.
+tv_camera source_camera(const tv_camera& tracked, const cv::Size& size, int resize,
+                        const std::string& what) {
+  if (shrunk_size(size, resize) != cv::Size(tracked.width, tracked.height))
+    throw BadInput("the source's pictures are " + std::to_string(size.width) + "x" +
+                   std::to_string(size.height) + ", which is not what " + what +
+                   " was made from (" + std::to_string(tracked.width) + "x" +
+                   std::to_string(tracked.height) + " as tracked)");
+  return resized(tracked, size.width, size.height);
+}
+
+std::string text_of(const Json& json) { return json.is_string() ? json.get<std::string>() : ""; }
+
+template <class T>
+T number_of(const Json& options, const char* key, T otherwise) {
+  return options.contains(key) && options[key].is_number() ? options[key].get<T>() : otherwise;
+}
+
+bool flag_of(const Json& options, const char* key) {
+  return options.contains(key) && options[key].is_boolean() && options[key].get<bool>();
+}
+
+// The source turns its pictures as it did when the camera file was given.
+void fit_as_tracked(FrameSource& source, const std::string& camera_file) {
+  if (camera_file.empty()) return;
+  try {
+    tv_camera camera = load_camera_file(camera_file).of("");
+    source.fit(camera);
+  } catch (const BadInput&) {
+    // Without the file the pictures stay as they are stored; where that is wrong, their size is.
+  }
+}
+
+}  // namespace
+
+RoomSource room_source_of_flight(const std::string& folder, const std::string& moved_to) {
+  const fs::path root = folder;
+  const auto file = [&root](const char* name) { return (root / name).string(); };
+  RoomSource made;
+  const Json json = flight_result(file("result.json"));
+  const Json& options = json["options"];
+  made.given = moved_to.empty() ? text_of(json["source"]) : moved_to;
+  const std::string camera_file = text_of(options.value("camera", Json()));
+  made.source = open_stored_source(made.given, number_of(options, "fps", 0.0),
+                                   !flag_of(options, "no_imu"), camera_file);
+  if (!made.source)
+    throw BadInput("the source of " + folder + " is not there: " + made.given +
+                   " (--source gives the place where it is now; a live source cannot be read "
+                   "again)");
+  fit_as_tracked(*made.source, camera_file);
+  const int segment = json["longest_segment"].get<int>();
+  const std::vector<SegmentPose> keys = read_poses(file("keyframes.txt"));
+  std::set<std::string> key_times;
+  for (const SegmentPose& key : keys)
+    if (key.segment == segment) key_times.insert(key.time);
+  const auto frames = frames_by_time(file("frames.csv"), number_of(options, "every", 1));
+  std::set<int> indices;
+  for (const SegmentPose& pose : read_poses(file("trajectory.txt"))) {
+    const auto found = frames.find(pose.time);
+    if (pose.segment != segment || found == frames.end()) continue;
+    made.scene.views.push_back({found->second.first, found->second.second, pose.pose.R, pose.pose.t,
+                                key_times.count(pose.time) != 0});
+    indices.insert(found->second.first);
+  }
+  if (made.scene.views.empty()) throw BadInput(folder + " has no frame with a pose");
+  made.scene.points = read_colmap_points(file("colmap/points3D.txt"));
+  made.scene.is_metric = text_of(json.value("scale", Json())) == "metric";
+  if (made.scene.is_metric) made.scene.scale_sigma = number_of(json, "scale_sigma", 0.0);
+  const SourceFrame first = first_frame(*made.source, indices);
+  made.scene.camera = source_camera(load_camera_file(file("colmap/cameras.txt")).of(""),
+                                    first.luma.size(), number_of(options, "resize", 0), folder);
+  if (const Json mask = options.value("mask", Json()); mask.is_string())
+    made.masks.path = mask.get<std::string>();
+  if (std::error_code error; fs::is_regular_file(root / "still_mask.png", error)) {
+    made.files.push_back(file("still_mask.png"));
+    made.still = load_picture(made.files.back()).luma;
+  }
+  if (const int count = number_of(json, "num_segments", 1); count > 1)
+    made.notes.push_back("the flight is in " + std::to_string(count) +
+                         " segments whose units and places do not compare: the room is of the "
+                         "longest one");
+  made.name = fs::absolute(fs::path(made.given) / "x").parent_path().filename().string();
+  for (const std::string& name : made.source->files()) made.files.push_back(name);
+  for (const char* name : {"result.json", "keyframes.txt", "trajectory.txt", "frames.csv"})
+    made.files.push_back(file(name));
+  return made;
+}
+
+RoomScene room_scene(const FlightResult& result) {
+  const Flight& flight = *result.flight;
+  RoomScene scene;
+  scene.camera = flight.corrected_file_camera();
+  std::set<int32_t> keys;  // numbers of given frames
+  for (const FlightKeyframe& key : result.keyframes)
+    if (key.keyframe.segment == result.segment) keys.insert(key.keyframe.frame);
+  std::set<size_t> key_frames;
+  for (const int32_t number : keys) key_frames.insert(flight.index_given(number));
+  for (size_t k = 0; k < flight.frames().size(); ++k) {
+    const FlightFrame& frame = flight.frames()[k];
+    if (frame.origin == PoseOrigin::kNone || frame.segment != result.segment) continue;
+    scene.views.push_back(
+        {frame.index, frame.name, frame.pose.R, frame.pose.t, key_frames.count(k) != 0});
+  }
+  for (const tv_map_point& point : result.points)
+    if (point.segment == result.segment)
+      scene.points.push_back({point.position[0], point.position[1], point.position[2]});
+  scene.is_metric = result.json["scale"] == "metric";
+  if (scene.is_metric) scene.scale_sigma = result.json["scale_sigma"].get<double>();
+  if (flight.is_upright()) scene.gravity = Vector3{0, 0, 1};
+  return scene;
+}
+
+void read_room_pictures(FrameSource& source, const Masks& masks, const cv::Mat& tracked_still,
+                        RoomBuilder& builder, const std::atomic<bool>& stop,
+                        const std::function<void()>& after_picture) {
+  const RoomScene& scene = builder.scene();
+  std::map<int, size_t> views;
+  for (size_t k = 0; k < scene.views.size(); ++k) views[scene.views[k].index] = k;
+  const cv::Size size(scene.camera.width, scene.camera.height);
+  cv::Mat still;
+  if (!tracked_still.empty()) cv::resize(tracked_still, still, size, 0, 0, cv::INTER_NEAREST);
+  int num_used = 0;
+  std::string problem;
+  const auto wanted = [&](int index) {
+    const auto view = views.find(index);
+    return view != views.end() && builder.wants(view->second);
+  };
+  const auto consume = [&](const SourceFrame& frame) {
+    RoomPicture picture;
+    if (frame.luma.size() == size) {
+      ++num_used;
+      picture.luma = frame.luma;
+      if (frame.colour.type() == CV_8UC3 && frame.colour.size() == size)
+        picture.colour = frame.colour;
+      picture.mask = masks.of(frame.name, size.width, size.height);
+      if (!still.empty()) picture.mask = picture.mask.empty() ? still : picture.mask & still;
+    } else if (problem.empty()) {
+      problem = frame.luma.empty() ? frame.problem : frame.name + " is of another size";
+    }
+    // The odometry's world has its z axis down where attitudes were given to it.
+    if (frame.world_from_cam) builder.set_gravity({0, 0, 1});
+    builder.add_picture(views.at(frame.index), picture);
+    if (after_picture) after_picture();
+    return true;
+  };
+  source.run(wanted, consume, stop);
+  if (num_used == 0 && !stop)
+    throw BadInput("no picture of the source could be used" +
+                   (problem.empty() ? std::string() : ": " + problem));
+}
+
+}  // namespace cli

@@ -1,0 +1,42 @@
+// What a room is made from, read from the disk: a source of frames and the poses of its frames.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "files/mask_file.h"
+#include "odometry/frames.h"
+#include "odometry/outputs.h"
+#include "room_model/builder.h"
+
+namespace cli {
+
+// Frames of a source that have a pose, as the scene that they show.
+struct RoomSource {
+  std::unique_ptr<FrameSource> source;
+  RoomScene scene;
+  Masks masks;                     // of the source's pictures
+  cv::Mat still;                   // what stands still in all of them, 0; may be empty
+  std::string name;                // of the source, for people
+  std::string given;               // as the user or result.json names it
+  std::vector<std::string> files;  // that were read, which no output may replace
+  std::vector<std::string> notes;
+};
+
+// What `twoview odometry` wrote into `folder`. moved_to: where its source lies now; empty: where
+// its result.json says. Throws BadInput.
+RoomSource room_source_of_flight(const std::string& folder, const std::string& moved_to);
+
+// The scene of a flight that has just ended: its longest segment.
+RoomScene room_scene(const FlightResult& result);
+
+// Gives the builder the pictures that it needs, until `stop` is set. tracked_still: as in
+// RoomSource, of the size at which the frames were tracked. `after_picture` may be empty.
+// Throws BadInput where none of the pictures could be used.
+void read_room_pictures(FrameSource& source, const Masks& masks, const cv::Mat& tracked_still,
+                        RoomBuilder& builder, const std::atomic<bool>& stop,
+                        const std::function<void()>& after_picture);
+
+}  // namespace cli

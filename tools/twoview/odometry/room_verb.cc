@@ -1,0 +1,99 @@
+// twoview room FOLDER -o OUT: a flight's pictures and poses to the surface of the room.
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+
+#include "base/error.h"
+#include "base/output.h"
+#include "base/terminal.h"
+#include "odometry/odometry_verb.h"
+#include "odometry/room_options.h"
+#include "odometry/room_source.h"
+#include "pair/options.h"
+#include "pair/result.h"
+#include "room_model/page.h"
+#include "room_model/room_files.h"
+#include "verbs/common.h"
+
+namespace cli {
+namespace {
+
+struct Arguments {
+  Common common;
+  std::string folder, source;
+  RoomSettings settings;
+};
+
+const char* const kNoSurface = "no surface: nothing was measured by two keyframes";
+
+std::string summary(const RoomSource& from, const RoomModel& model, const OutputSet& files,
+                    const std::string& notes) {
+  std::string text = summary_line("source", "%s, %zu frames with a pose", from.name.c_str(),
+                                  from.scene.views.size());
+  text += notes + room_summary(from.scene, model);
+  std::string names;
+  for (const std::string& name : files.names()) names += " " + name;
+  return text + summary_line("files", "%s:%s%s", files.folder().c_str(), names.c_str(),
+                             model.depth_maps.empty() ? "" : " depth/");
+}
+
+int room(Arguments& a) {
+  Common& common = a.common;
+  const std::atomic<bool>& stop = stop_flag_for_signals();
+  RoomSource from = room_source_of_flight(a.folder, a.source);
+  OutputSet files(common.output);
+  for (const std::string& name : from.files) files.keep(name);
+  std::vector<std::string> names = kRoomFiles;
+  names.insert(names.end(), {"result.json", "report.html"});
+  files.require_own({"room", names, {"result.json"}, {"frames.csv"}});
+  RoomBuilder builder(from.scene, a.settings);
+  read_pictures_with_progress(*from.source, from.masks, from.still, builder, stop, !common.quiet);
+  const RoomModel model = finish_with_progress(builder, !common.quiet);
+  from.scene = builder.scene();
+  for (const std::string& mask : from.masks.files()) files.keep(mask);
+  for (const std::string& note : from.notes) common.note(note);
+  for (const std::string& note : room_notes(model, stop)) common.note(note);
+  nlohmann::ordered_json json;
+  json["room"] = room_json(from.scene, model);
+  json["source"] = from.given;
+  json["scale"] = from.scene.is_metric ? "metric" : "unit";
+  json["scale_sigma"] = from.scene.scale_sigma > 0 ? nlohmann::ordered_json(from.scene.scale_sigma)
+                                                   : nlohmann::ordered_json(nullptr);
+  json["notes"] = common.notes;
+  json["interrupted"] = stop.load();
+  json["options"] = room_options_json(a.settings);
+  json["options"]["folder"] = a.folder;
+  json["version"] = tv_version_string();
+  files.add("result.json", json_text(json));
+  files.add("report.html", room_report(from.scene, model, from.name, common.notes, json));
+  add_room_files(from.scene, model, files);
+  DepthFolder depth(files.folder(), model);
+  if (common.json) print(json_text(json));
+  const std::string notes = common.note_lines();
+  if (common.speaks()) print(summary(from, model, files, notes));
+  files.commit();
+  files.remove_others(kRoomFiles);
+  depth.commit();
+  if (!model.triangles.empty()) return kExitPose;
+  std::fprintf(stderr, "twoview: %s\n", kNoSurface);
+  return kExitNoPose;
+}
+
+}  // namespace
+
+void add_room(CLI::App& program, Run& run) {
+  auto a = std::make_shared<Arguments>();
+  CLI::App* verb = program.add_subcommand(
+      "room", "the surface of a room, of the pictures and poses of a flight");
+  verb->add_option("FOLDER", a->folder, "what twoview odometry wrote of the flight")
+      ->required()
+      ->type_name("FOLDER");
+  verb->add_option("--source", a->source,
+                   "where the flight's pictures lie now; without: where they lay then")
+      ->type_name("SOURCE");
+  add_room_options(*verb, a->settings);
+  add_common(*verb, a->common, 0, "folder for the results");
+  verb->final_callback([a, &run] { run = [a] { return room(*a); }; });
+}
+
+}  // namespace cli

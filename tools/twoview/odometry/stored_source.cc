@@ -1,0 +1,45 @@
+#include "odometry/stored_source.h"
+
+#include <filesystem>
+
+#include "base/error.h"
+#ifdef TWOVIEW_HAS_DRONE
+#include "odometry/drone_frames.h"
+#endif
+
+namespace cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::unique_ptr<FrameSource> open_recording_folder(const std::string& path,
+                                                   const std::string& camera_file) {
+#ifdef TWOVIEW_HAS_DRONE
+  return open_recording(path, camera_file);
+#else
+  (void)camera_file;
+  throw BadInput("cannot read " + path + ": this program was built without the drone's driver");
+#endif
+}
+
+}  // namespace
+
+bool is_recording_folder(const std::string& path) {
+  std::error_code error;
+  return fs::exists(fs::path(path) / "video.pave", error) ||
+         fs::exists(fs::path(path) / "vehicle.tlog", error);
+}
+
+std::unique_ptr<FrameSource> open_stored_source(const std::string& path, double fps, bool with_imu,
+                                                const std::string& camera_file) {
+  std::error_code error;
+  if (fs::is_directory(path, error)) {
+    if (!is_recording_folder(path)) return open_image_folder(path, fps, with_imu);
+    if (fps > 0) throw BadInput("--fps: a recording of a drone has times");
+    return open_recording_folder(path, camera_file);
+  }
+  if (fs::is_regular_file(path, error)) return open_film(path, fps);
+  return nullptr;
+}
+
+}  // namespace cli

@@ -1,0 +1,331 @@
+#include "room_model/builder.h"
+
+#include <time.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+#include "room_model/axes.h"
+#include "room_model/plan.h"
+
+namespace cli {
+namespace {
+
+// The side of a voxel as a share of the median depth: 3 cm at 2.5 m, about three pixels of a depth
+// map.
+constexpr double kVoxelShare = 0.012;
+constexpr int32_t kFewestMaps = 2;  // that must have seen a surface, where there are two at all
+
+// CPU time of this thread, in milliseconds: other programs on the machine do not count.
+double cpu_ms() {
+  timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return 1e3 * static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_nsec);
+}
+
+// The median of the keyframes' median depths; 0 where none is known.
+double median_of(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// The number with two digits, which is what a scene says of a voxel that fits.
+double two_digits(double value) {
+  const double unit = std::pow(10.0, std::floor(std::log10(value)) - 1);
+  return std::round(value / unit) * unit;
+}
+
+// The vertices of pieces that tv_room_mesh leaves out stay in its list.
+void leave_out_loose_vertices(RoomMesh& mesh) {
+  std::vector<int32_t> renamed(mesh.vertices.size(), -1);
+  for (const tv_room_triangle& triangle : mesh.triangles)
+    for (const int32_t idx : triangle.idx_vertex) renamed[static_cast<size_t>(idx)] = 0;
+  int32_t count = 0;
+  for (size_t i = 0; i < renamed.size(); ++i) {
+    if (renamed[i] < 0) continue;
+    renamed[i] = count;
+    mesh.vertices[static_cast<size_t>(count++)] = mesh.vertices[i];
+  }
+  mesh.vertices.resize(static_cast<size_t>(count));
+  for (tv_room_triangle& triangle : mesh.triangles)
+    for (int32_t& idx : triangle.idx_vertex) idx = renamed[static_cast<size_t>(idx)];
+}
+
+}  // namespace
+
+RoomBuilder::RoomBuilder(RoomScene scene, const RoomSettings& settings)
+    : scene_(std::move(scene)),
+      settings_(settings),
+      sweep_(scene_.camera),
+      uses_(scene_.views.size()) {
+  std::map<size_t, DepthRange> ranges;
+  std::vector<double> depths;
+  for (size_t k = 0; k < scene_.views.size(); ++k) {
+    if (!scene_.views[k].is_keyframe) continue;
+    ranges[k] = depth_range(scene_, scene_.views[k]);
+    if (ranges[k].is_known()) depths.push_back(ranges[k].median);
+  }
+  median_depth_ = median_of(depths);
+  for (const size_t k : choose_keyframes(scene_, median_depth_)) {
+    Job job{k, {k}, k, ranges[k]};
+    if (job.range.is_known())
+      for (const size_t partner : choose_partners(scene_, k, job.range.median))
+        job.views.push_back(partner);
+    job.last = *std::max_element(job.views.begin(), job.views.end());
+    jobs_.push_back(std::move(job));
+  }
+  std::stable_sort(jobs_.begin(), jobs_.end(),
+                   [](const Job& a, const Job& b) { return a.last < b.last; });
+  for (const Job& job : jobs_)
+    for (const size_t view : job.views) ++uses_[view];
+  tv_room_options options;
+  tv_room_options_init(&options);
+  if (settings_.voxel > 0)
+    options.voxel = settings_.voxel;
+  else if (median_depth_ > 0)
+    options.voxel = two_digits(kVoxelShare * median_depth_);
+  first_voxel_ = options.voxel;
+  const size_t bytes = static_cast<size_t>(settings_.max_memory_mib) << 20;
+  memory_.resize(bytes + TV_CONTEXT_ALIGNMENT);
+  check(tv_room_init(&options, aligned(memory_), bytes, &room_), "cannot make a room");
+}
+
+void RoomBuilder::add_picture(size_t k, const RoomPicture& picture) {
+  if (k > 0) run_until(k - 1);
+  if (wants(k)) {
+    pictures_[k] = picture;
+    // The source may use its memory again for the next picture.
+    pictures_[k].luma = picture.luma.clone();
+    pictures_[k].colour = picture.colour.clone();
+    pictures_[k].mask = picture.mask.clone();
+  }
+  run_until(k);
+}
+
+// Runs the jobs that need no view after `view`.
+void RoomBuilder::run_until(size_t view) {
+  for (; next_job_ < jobs_.size() && jobs_[next_job_].last <= view; ++next_job_) {
+    const Job& job = jobs_[next_job_];
+    run(job);
+    for (const size_t used : job.views)
+      if (--uses_[used] == 0) pictures_.erase(used);
+  }
+}
+
+void RoomBuilder::run(const Job& job) {
+  std::vector<const RoomView*> views;
+  std::vector<const RoomPicture*> pictures;
+  for (const size_t k : job.views) {
+    const auto found = pictures_.find(k);
+    if (found == pictures_.end() || found->second.luma.empty()) {
+      ++num_missing_;
+      if (k == job.key) {
+        ++num_without_;
+        return;
+      }
+      continue;
+    }
+    views.push_back(&scene_.views[k]);
+    pictures.push_back(&found->second);
+  }
+  const double before = cpu_ms();
+  if (views.size() < 2) {
+    ++num_without_;
+    sweep_.count_unmapped(*pictures[0], counts_);
+    return;
+  }
+  maps_.push_back({job.key, sweep_.run(views, pictures, job.range.near, job.range.far, counts_)});
+  const double swept = cpu_ms();
+  fuse(maps_.back());
+  ms_depth_ += swept - before;
+  ms_fusion_ += cpu_ms() - swept;
+}
+
+void RoomBuilder::fill(const Map& map, tv_depth_map& out) {
+  const tv_camera& camera = sweep_.map_camera();
+  map.pixels.unpack(distance_, sigma_, rgb_);
+  tv_depth_map_init(&out);
+  out.width = out.stride = camera.width;
+  out.height = camera.height;
+  out.distance = distance_.data();
+  out.sigma = sigma_.data();
+  out.pixels = rgb_.data();
+  out.pixel_stride_bytes = 3 * static_cast<int64_t>(camera.width);
+  out.channels = 3;
+}
+
+void RoomBuilder::fuse(const Map& map) {
+  const RoomView& view = scene_.views[map.view];
+  tv_depth_map given;
+  fill(map, given);
+  tv_status status = TV_OK;
+  // What is in the room stays in it, with voxels of twice the side.
+  while ((status = tv_room_add(room_, &sweep_.map_camera(), view.R.data(), view.t.data(),
+                               &given)) == TV_ERR_CAPACITY)
+    check(tv_room_coarsen(room_), "the room does not fit into --max-memory");
+  check(status, "the depth map of " + view.name);
+}
+
+void RoomBuilder::find_up(RoomModel& model) const {
+  if (scene_.gravity) {
+    for (size_t axis = 0; axis < 3; ++axis) model.up[axis] = -(*scene_.gravity)[axis];
+    model.up_source = "gravity";
+    return;
+  }
+  // People and drones hold a camera more or less level: its y axis points down on average.
+  Vector3 sum{0, 0, 0};
+  for (const RoomView& view : scene_.views)
+    for (size_t axis = 0; axis < 3; ++axis) sum[axis] -= view.R[3 * axis + 1];
+  const double length = norm(sum);
+  if (length > 0)
+    for (size_t axis = 0; axis < 3; ++axis) model.up[axis] = sum[axis] / length;
+  model.up_source = "cameras";
+  // Floor, ceiling and tables say it better where they were measured.
+  constexpr double kMostCosine = 0.94;  // of 20 degrees
+  Vector3 level{0, 0, 0};
+  for (const tv_room_plane& plane : model.planes) {
+    const Vector3 normal{plane.normal[0], plane.normal[1], plane.normal[2]};
+    const double cosine = dot(normal, model.up);
+    if (std::abs(cosine) < kMostCosine) continue;
+    for (size_t axis = 0; axis < 3; ++axis)
+      level[axis] += (cosine < 0 ? -plane.area : plane.area) * normal[axis];
+  }
+  const double weight = norm(level);
+  if (!(weight > 0)) return;
+  for (size_t axis = 0; axis < 3; ++axis) model.up[axis] = level[axis] / weight;
+  model.up_source = "level surfaces";
+}
+
+void RoomBuilder::find_planes(RoomModel& model) const {
+  const auto find = [&](const Vector3* up) {
+    tv_room_plane_options options;
+    tv_room_plane_options_init(&options);
+    if (up != nullptr)
+      for (size_t axis = 0; axis < 3; ++axis) options.gravity[axis] = -(*up)[axis];
+    model.planes.resize(TV_ROOM_MAX_PLANES);
+    int32_t count = 0;
+    check(tv_room_find_planes(room_, &options, model.planes.data(), TV_ROOM_MAX_PLANES, &count),
+          "the planes of the room");
+    model.planes.resize(static_cast<size_t>(count));
+  };
+  if (!scene_.gravity) find(nullptr);
+  find_up(model);
+  find(&model.up);
+}
+
+RoomMesh RoomBuilder::mesh() const {
+  tv_room_mesh_options options;
+  tv_room_mesh_options_init(&options);
+  options.measured_only = 1;
+  options.min_maps = std::min(kFewestMaps, std::max(1, static_cast<int32_t>(maps_.size())));
+  RoomMesh mesh;
+  tv_room_state state;
+  tv_room_state_init(&state);
+  check(tv_room_get_state(room_, &state), "the room");
+  mesh.voxel = state.voxel;
+  int32_t num_vertices = 0, num_triangles = 0;
+  tv_status status =
+      tv_room_mesh(room_, &options, nullptr, 0, nullptr, 0, &num_vertices, &num_triangles);
+  if (status == TV_ERR_CAPACITY) {
+    mesh.vertices.resize(static_cast<size_t>(num_vertices));
+    mesh.triangles.resize(static_cast<size_t>(num_triangles));
+    status = tv_room_mesh(room_, &options, mesh.vertices.data(), num_vertices,
+                          mesh.triangles.data(), num_triangles, &num_vertices, &num_triangles);
+  }
+  check(status, "the surface");
+  leave_out_loose_vertices(mesh);
+  return mesh;
+}
+
+// Coarsens the room, which must not be needed any more.
+void RoomBuilder::add_page_mesh(RoomModel& model) {
+  constexpr size_t kMostTriangles = 250000;  // a page of 5 MB, which is drawn in about 0.1 s
+  model.page_mesh = {model.vertices, model.triangles, model.voxel};
+  while (model.page_mesh.triangles.size() > kMostTriangles && tv_room_coarsen(room_) == TV_OK)
+    model.page_mesh = mesh();
+}
+
+void RoomBuilder::add_depth_maps(RoomModel& model) {
+  const tv_camera& camera = sweep_.map_camera();
+  for (const Map& map : maps_) {
+    map.pixels.unpack(distance_, sigma_, rgb_);
+    for (int y = 0, i = 0; y < camera.height; ++y) {
+      for (int x = 0; x < camera.width; ++x, ++i) {
+        const double u = (x - camera.cx) / camera.fx, v = (y - camera.cy) / camera.fy;
+        distance_[static_cast<size_t>(i)] /= static_cast<float>(std::sqrt(1 + u * u + v * v));
+      }
+    }
+    const RoomView& view = scene_.views[map.view];
+    model.depth_maps.push_back({view.index, view.name, distance_});
+  }
+}
+
+void RoomBuilder::add_free_area(RoomModel& model) {
+  constexpr int kStep = 4;  // pixels between rays
+  const tv_camera& camera = sweep_.map_camera();
+  FreeArea area(model);
+  for (const Map& map : maps_) {
+    const RoomView& view = scene_.views[map.view];
+    map.pixels.unpack(distance_, sigma_, rgb_);
+    for (int y = 0; y < camera.height; y += kStep) {
+      for (int x = 0; x < camera.width; x += kStep) {
+        const double distance = static_cast<double>(
+            distance_[static_cast<size_t>(y) * static_cast<size_t>(camera.width) +
+                      static_cast<size_t>(x)]);
+        if (!(distance > 0)) continue;
+        Vector3 ray{(x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy, 1};
+        const double scale = distance / norm(ray);
+        for (double& value : ray) value *= scale;
+        Vector3 hit = applied(view.R, ray);
+        for (size_t k = 0; k < 3; ++k) hit[k] += view.t[k];
+        area.add_ray(view.t, hit);
+      }
+    }
+  }
+  model.free_cells = area.cells();
+  model.free_cell = area.cell();
+  model.free_origin = area.origin();
+}
+
+RoomModel RoomBuilder::finish() {
+  // A flight that was ended has jobs whose partners will not come.
+  if (!scene_.views.empty()) run_until(scene_.views.size() - 1);
+  RoomModel model;
+  const double before = cpu_ms();
+  for (const Map& map : maps_) {
+    const RoomView& view = scene_.views[map.view];
+    tv_depth_map given;
+    fill(map, given);
+    const tv_status status =
+        tv_room_see_through(room_, &sweep_.map_camera(), view.R.data(), view.t.data(), &given);
+    // TV_ERR_ARGUMENT: a coarser voxel has fixed it.
+    if (status != TV_ERR_ARGUMENT) check(status, "the depth map of " + view.name);
+  }
+  find_planes(model);
+  RoomMesh surface = mesh();
+  model.vertices = std::move(surface.vertices);
+  model.triangles = std::move(surface.triangles);
+  model.voxel = surface.voxel;
+  find_axes(model);
+  add_free_area(model);
+  model.ms_mesh = cpu_ms() - before;
+  model.first_voxel = first_voxel_;
+  model.keyframes_used = static_cast<int>(maps_.size());
+  model.keyframes_without = num_without_;
+  model.pictures_missing = num_missing_;
+  const double num = std::max<double>(1, model.keyframes_used);
+  model.ms_depth = ms_depth_ / num;
+  model.ms_fusion = ms_fusion_ / num;
+  model.memory_bytes = static_cast<size_t>(settings_.max_memory_mib) << 20;
+  model.median_depth = median_depth_;
+  model.pixels = counts_;
+  model.map_camera = sweep_.map_camera();
+  if (settings_.keeps_depth_maps) add_depth_maps(model);
+  add_page_mesh(model);
+  return model;
+}
+
+}  // namespace cli

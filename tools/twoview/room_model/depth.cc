@@ -1,0 +1,157 @@
+#include "room_model/depth.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "base/error.h"
+#include "files/camera_file.h"
+
+namespace cli {
+namespace {
+
+// A distance that fewer other pictures confirm is left out: one alone may be a chance likeness.
+constexpr int kFewestWitnesses = 2;
+// The largest difference of neighbours in a smoothed picture, in grey levels, that counts as no
+// texture, as in tv_room_infer_options; and the side of the window that is looked at, in pixels.
+constexpr int kPlainStep = 3, kPlainWindow = 9;
+
+tv_image view_of(const cv::Mat& luma) {
+  return {luma.data, luma.cols, luma.rows, static_cast<int64_t>(luma.step)};
+}
+
+// 255 where the surroundings of a pixel have texture.
+cv::Mat texture_of(const cv::Mat& grey) {
+  cv::Mat smooth, low, high, step;
+  cv::blur(grey, smooth, {3, 3});
+  const cv::Mat near = cv::Mat::ones(3, 3, CV_8U);
+  cv::dilate(smooth, high, near);
+  cv::erode(smooth, low, near);
+  cv::subtract(high, low, step);
+  cv::Mat textured = step > kPlainStep;
+  cv::dilate(textured, textured, cv::Mat::ones(kPlainWindow, kPlainWindow, CV_8U));
+  return textured;
+}
+
+}  // namespace
+
+uint8_t* aligned(std::vector<uint8_t>& memory) {
+  const size_t over = reinterpret_cast<uintptr_t>(memory.data()) % TV_CONTEXT_ALIGNMENT;
+  return memory.data() + (over == 0 ? 0 : TV_CONTEXT_ALIGNMENT - over);
+}
+
+KnownPixels::KnownPixels(const std::vector<float>& distance, const std::vector<float>& sigma,
+                         const std::vector<uint8_t>& rgb)
+    : is_known_(distance.size()) {
+  for (size_t i = 0; i < distance.size(); ++i) {
+    if (!(distance[i] > 0)) continue;
+    is_known_[i] = true;
+    distance_.push_back(distance[i]);
+    sigma_.push_back(sigma[i]);
+    rgb_.insert(rgb_.end(), &rgb[3 * i], &rgb[3 * i] + 3);
+  }
+  distance_.shrink_to_fit();
+  sigma_.shrink_to_fit();
+  rgb_.shrink_to_fit();
+}
+
+void KnownPixels::unpack(std::vector<float>& distance, std::vector<float>& sigma,
+                         std::vector<uint8_t>& rgb) const {
+  distance.assign(is_known_.size(), 0);
+  sigma.assign(is_known_.size(), 0);
+  rgb.assign(3 * is_known_.size(), 0);
+  size_t next = 0;
+  for (size_t i = 0; i < is_known_.size(); ++i) {
+    if (!is_known_[i]) continue;
+    distance[i] = distance_[next];
+    sigma[i] = sigma_[next];
+    std::copy_n(&rgb_[3 * next], 3, &rgb[3 * i]);
+    ++next;
+  }
+}
+
+DepthSweep::DepthSweep(const tv_camera& camera) : camera_(camera) {
+  tv_depth_options_init(&options_);
+  check(tv_depth_map_camera(&camera_, &options_, &map_camera_), "cannot make depth maps");
+  check(tv_depth_size(&camera_, &options_, &memory_bytes_), "cannot make depth maps");
+  memory_.resize(memory_bytes_ + TV_CONTEXT_ALIGNMENT);
+  const int width = map_camera_.width, height = map_camera_.height;
+  const size_t count = static_cast<size_t>(width) * static_cast<size_t>(height);
+  distance_.resize(count);
+  sigma_.resize(count);
+  witnesses_.resize(count);
+  grey_.resize(count);
+  rgb_.resize(3 * count);
+  // A picture is reduced by area averaging before it is sampled: single pixels of a large one would
+  // be noise.
+  const double scale = std::min(1.0, map_camera_.fx / camera_.fx);
+  reduced_ = {std::max(1, static_cast<int>(std::lround(scale * camera_.width))),
+              std::max(1, static_cast<int>(std::lround(scale * camera_.height)))};
+  const tv_camera small = resized(camera_, reduced_.width, reduced_.height);
+  map_x_.create(height, width, CV_32F);
+  map_y_.create(height, width, CV_32F);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const double ray[3] = {(x - map_camera_.cx) / map_camera_.fx,
+                             (y - map_camera_.cy) / map_camera_.fy, 1};
+      double pixel[2] = {-1e6, -1e6};
+      tv_camera_project(&small, ray, pixel, nullptr);
+      map_x_.at<float>(y, x) = static_cast<float>(pixel[0]);
+      map_y_.at<float>(y, x) = static_cast<float>(pixel[1]);
+    }
+  }
+}
+
+void DepthSweep::bring_to_map(const cv::Mat& picture, cv::Mat& out, int interpolation) const {
+  cv::Mat small = picture;
+  if (picture.size() != reduced_) cv::resize(picture, small, reduced_, 0, 0, cv::INTER_AREA);
+  cv::remap(small, out, map_x_, map_y_, interpolation, cv::BORDER_CONSTANT);
+}
+
+KnownPixels DepthSweep::run(const std::vector<const RoomView*>& views,
+                            const std::vector<const RoomPicture*>& pictures, double near_depth,
+                            double far_depth, PixelCounts& counts) {
+  std::vector<tv_depth_view> swept(views.size());
+  for (size_t k = 0; k < views.size(); ++k) {
+    swept[k].image = view_of(pictures[k]->luma);
+    swept[k].camera = &camera_;
+    std::copy(views[k]->R.begin(), views[k]->R.end(), swept[k].world_from_cam_R);
+    std::copy(views[k]->t.begin(), views[k]->t.end(), swept[k].world_from_cam_t);
+  }
+  options_.near_depth = near_depth;
+  options_.far_depth = far_depth;
+  const tv_depth_arrays arrays{distance_.data(), sigma_.data(), witnesses_.data(), grey_.data()};
+  check(tv_sweep_depth(swept.data(), static_cast<int32_t>(swept.size()), &options_,
+                       aligned(memory_), memory_bytes_, &arrays),
+        "the depth of " + views[0]->name);
+  const RoomPicture& picture = *pictures[0];
+  const cv::Size size(map_camera_.width, map_camera_.height);
+  cv::Mat bgr, rgb(size, CV_8UC3, rgb_.data()), mask;
+  bring_to_map(picture.colour.empty() ? picture.luma : picture.colour, bgr, cv::INTER_LINEAR);
+  cv::cvtColor(bgr, rgb, bgr.channels() == 1 ? cv::COLOR_GRAY2RGB : cv::COLOR_BGR2RGB);
+  if (!picture.mask.empty()) bring_to_map(picture.mask, mask, cv::INTER_NEAREST);
+  const cv::Mat textured = texture_of(cv::Mat(size, CV_8U, grey_.data()));
+  for (size_t i = 0; i < distance_.size(); ++i) {
+    if (!mask.empty() && mask.data[i] == 0) {
+      distance_[i] = 0;
+    } else if (witnesses_[i] >= kFewestWitnesses && distance_[i] > 0) {
+      ++counts.measured;
+    } else {
+      ++(textured.data[i] == 0 ? counts.no_texture
+         : distance_[i] > 0    ? counts.unconfirmed
+                               : counts.ambiguous);
+      distance_[i] = 0;
+    }
+  }
+  return KnownPixels(distance_, sigma_, rgb_);
+}
+
+void DepthSweep::count_unmapped(const RoomPicture& picture, PixelCounts& counts) {
+  cv::Mat grey;
+  bring_to_map(picture.luma, grey, cv::INTER_LINEAR);
+  const int plain = static_cast<int>(grey.total()) - cv::countNonZero(texture_of(grey));
+  counts.no_texture += plain;
+  counts.one_place += static_cast<int64_t>(grey.total()) - plain;
+}
+
+}  // namespace cli

@@ -1,0 +1,70 @@
+// The depth map of one keyframe, as it is kept until the room is finished.
+#pragma once
+
+#include <opencv2/core/mat.hpp>
+#include <vector>
+
+#include "room_model/scene.h"
+#include "twoview/context.h"
+#include "twoview/depth_map.h"
+
+namespace cli {
+
+// A view's picture.
+struct RoomPicture {
+  cv::Mat luma;    // 8-bit; empty: could not be read
+  cv::Mat colour;  // BGR of the size of luma; empty: grey
+  cv::Mat mask;    // of the size of luma, 0 where it shows no scene; empty: all of it does
+};
+
+// The pixels of a map whose distance is known; the others take no memory.
+class KnownPixels {
+ public:
+  // distance, sigma: `count` each, 0 where unknown. rgb: three times as many bytes.
+  KnownPixels(const std::vector<float>& distance, const std::vector<float>& sigma,
+              const std::vector<uint8_t>& rgb);
+  // The same again, with zeros in all three where the distance is unknown.
+  void unpack(std::vector<float>& distance, std::vector<float>& sigma,
+              std::vector<uint8_t>& rgb) const;
+  size_t num_known() const { return distance_.size(); }
+
+ private:
+  std::vector<bool> is_known_;
+  std::vector<float> distance_, sigma_;
+  std::vector<uint8_t> rgb_;
+};
+
+// Sweeps the depth of views; its memory is made once.
+class DepthSweep {
+ public:
+  // Throws BadInput where no depth map can be made of pictures of this camera.
+  explicit DepthSweep(const tv_camera& camera);
+  // What the map's pixels lie on: a pinhole.
+  const tv_camera& map_camera() const { return map_camera_; }
+
+  // The depth of the first view; `counts` gets what became of its pixels. All pictures have their
+  // luma, and there are two at least.
+  KnownPixels run(const std::vector<const RoomView*>& views,
+                  const std::vector<const RoomPicture*>& pictures, double near_depth,
+                  double far_depth, PixelCounts& counts);
+  // The pixels of the map without texture, for a view that has no map.
+  void count_unmapped(const RoomPicture& picture, PixelCounts& counts);
+
+ private:
+  void bring_to_map(const cv::Mat& picture, cv::Mat& out, int interpolation) const;
+
+  tv_camera camera_, map_camera_;
+  tv_depth_options options_;
+  std::vector<uint8_t> memory_;
+  size_t memory_bytes_ = 0;
+  cv::Mat map_x_, map_y_;  // where the reduced picture shows each pixel of the map
+  cv::Size reduced_;       // size to which a picture is reduced before it is sampled
+  std::vector<float> distance_, sigma_;
+  std::vector<uint8_t> witnesses_, grey_, rgb_;
+};
+
+// The first address of `memory` that the library's contexts may start at; `memory` has
+// TV_CONTEXT_ALIGNMENT bytes more than are needed.
+uint8_t* aligned(std::vector<uint8_t>& memory);
+
+}  // namespace cli

@@ -1,0 +1,27 @@
+// Which other views a keyframe is compared with for its depth map.
+#pragma once
+
+#include <vector>
+
+#include "room_model/scene.h"
+
+namespace cli {
+
+// The range of depth that is searched for a keyframe, and the depth that is most common.
+struct DepthRange {
+  double near = 0, median = 0, far = 0;  // along the optical axis; near 0: not known
+  bool is_known() const { return near > 0; }
+};
+
+// By the scene's points that the view shows; not known with fewer than twenty of them.
+DepthRange depth_range(const RoomScene& scene, const RoomView& view);
+
+// The keyframes that get a depth map: those that see something new by a step of a twelfth of the
+// median depth or a turn of 10 degrees from the one chosen before. median_depth 0: all.
+std::vector<size_t> choose_keyframes(const RoomScene& scene, double median_depth);
+
+// The indices of up to four views of the scene that show what view `key` shows, from places a tenth
+// and a fifth of the median depth away, to both sides of it. Empty where there are none.
+std::vector<size_t> choose_partners(const RoomScene& scene, size_t key, double median_depth);
+
+}  // namespace cli

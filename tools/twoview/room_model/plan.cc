@@ -1,0 +1,333 @@
+#include "room_model/plan.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <opencv2/imgproc.hpp>
+#include <set>
+
+#include "pictures/canvas.h"
+
+namespace cli {
+namespace {
+
+constexpr int kFewestRays = 3;          // through a cell that is free: single ones may be wrong
+constexpr double kLeastPart = 0.05;     // of the largest free area, for another one to count
+constexpr double kUprightNormal = 0.3;  // the most of a normal's length along `up`: 17 degrees
+
+Vector3 position_of(const tv_room_vertex& v) {
+  return {static_cast<double>(v.position[0]), static_cast<double>(v.position[1]),
+          static_cast<double>(v.position[2])};
+}
+
+Vector3 normal_of(const tv_room_vertex& v) {
+  return {static_cast<double>(v.normal[0]), static_cast<double>(v.normal[1]),
+          static_cast<double>(v.normal[2])};
+}
+
+cv::Point2d from_above(const Matrix3& axes, const Vector3& point) {
+  const Vector3 at = applied(axes, point);
+  return {at[0], at[1]};
+}
+
+// The stretches of a line along which enough of a plane was measured. `along`: where on the line
+// each vertex of the plane lies.
+std::vector<std::pair<double, double>> stretches(std::vector<double> along, double voxel) {
+  const double gap = 10 * voxel, shortest = 8 * voxel;  // 30 and 24 cm at 3 cm
+  constexpr double kVerticesOfCell = 6;                 // one above the other: 18 cm at 3 cm
+  std::sort(along.begin(), along.end());
+  std::vector<std::pair<double, double>> found;
+  for (size_t begin = 0; begin < along.size();) {
+    size_t end = begin + 1;
+    while (end < along.size() && along[end] - along[end - 1] < gap) ++end;
+    const double length = along[end - 1] - along[begin];
+    if (length > shortest && static_cast<double>(end - begin) > kVerticesOfCell * length / voxel)
+      found.emplace_back(along[begin], along[end - 1]);
+    begin = end;
+  }
+  return found;
+}
+
+void add_lines(const RoomModel& model, RoomPlan& plan) {
+  constexpr double kWallBehind = 0.03;  // as for tv_room_infer
+  constexpr double kSameNormal = 0.9;   // cosine of 26 degrees
+  for (const tv_room_plane& plane : model.planes) {
+    if (plane.kind != TV_ROOM_PLANE_UPRIGHT) continue;
+    const Vector3 normal{plane.normal[0], plane.normal[1], plane.normal[2]};
+    Vector3 along = cross(model.up, normal);
+    const double length = norm(along);
+    if (!(length > 0)) continue;
+    for (double& value : along) value /= length;
+    std::vector<double> places;
+    for (const tv_room_vertex& v : model.vertices) {
+      const Vector3 at = position_of(v);
+      if (std::abs(dot(normal, at) - plane.offset) < 2 * model.voxel &&
+          dot(normal, normal_of(v)) > kSameNormal)
+        places.push_back(dot(along, at));
+    }
+    const Vector3 centre{plane.centre[0], plane.centre[1], plane.centre[2]};
+    const double middle = dot(along, centre);
+    for (const auto& [low, high] : stretches(std::move(places), model.voxel)) {
+      Vector3 a = centre, b = centre;
+      for (size_t k = 0; k < 3; ++k) {
+        a[k] += (low - middle) * along[k];
+        b[k] += (high - middle) * along[k];
+      }
+      plan.lines.push_back(
+          {from_above(model.axes, a), from_above(model.axes, b), plane.share_behind < kWallBehind});
+    }
+  }
+}
+
+void add_free_area(const RoomModel& model, RoomPlan& plan) {
+  std::vector<std::vector<cv::Point>> outlines;
+  cv::findContours(model.free_cells.clone(), outlines, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_SIMPLE);
+  double most = 0;
+  for (const auto& outline : outlines) most = std::max(most, cv::contourArea(outline));
+  cv::Mat kept = cv::Mat::zeros(model.free_cells.size(), CV_8U);
+  for (const auto& outline : outlines) {
+    if (cv::contourArea(outline) < kLeastPart * most) continue;
+    cv::drawContours(kept, std::vector<std::vector<cv::Point>>{outline}, 0, 255, cv::FILLED);
+    std::vector<cv::Point2d> points;
+    for (const cv::Point& p : outline)
+      points.push_back(model.free_origin + model.free_cell * cv::Point2d(p.x + 0.5, p.y + 0.5));
+    plan.free.push_back(std::move(points));
+  }
+  plan.area = cv::countNonZero(kept) * model.free_cell * model.free_cell;
+}
+
+// The number of the form 1, 2 or 5 times a power of ten that is nearest below.
+double round_below(double value) {
+  const double power = std::pow(10.0, std::floor(std::log10(value)));
+  for (const double digit : {5.0, 2.0})
+    if (digit * power <= value) return digit * power;
+  return power;
+}
+
+// A drawing on a sheet in pixels, of which both formats are made.
+struct Shape {
+  enum Kind { kArea, kLine, kDot, kText } kind;
+  std::vector<cv::Point2d> points;
+  double size = 1;     // width of a line, side of a dot, height of capitals; pixels
+  const char* colour;  // "#rrggbb"
+  std::string text;
+};
+struct Drawing {
+  int width = 0, height = 0;  // pixels
+  std::vector<Shape> shapes;
+};
+
+const char* const kPaper = "#ffffff";
+const char* const kFree = "#e8eef4";
+const char* const kUpright = "#a9b4bf";
+const char* const kPath = "#3f86d6";
+const char* const kWall = "#1b222b";
+const char* const kOther = "#5b6673";
+
+std::string short_number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", value);
+  return text;
+}
+
+Drawing drawing_of(const RoomPlan& plan, const RoomScene& scene, const RoomModel& model) {
+  constexpr double kSide = 820, kMargin = 40, kFoot = 70;  // pixels
+  double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
+  const auto include = [&](const cv::Point2d& p) {
+    low[0] = std::min(low[0], p.x);
+    low[1] = std::min(low[1], p.y);
+    high[0] = std::max(high[0], p.x);
+    high[1] = std::max(high[1], p.y);
+  };
+  for (const auto& outline : plan.free) std::for_each(outline.begin(), outline.end(), include);
+  for (const PlanLine& line : plan.lines) include(line.a), include(line.b);
+  std::for_each(plan.path.begin(), plan.path.end(), include);
+  if (!(high[0] > low[0])) std::for_each(plan.upright.begin(), plan.upright.end(), include);
+  Drawing sheet;
+  if (!(high[0] > low[0]) || !(high[1] > low[1])) return {320, 120, {}};
+  const double scale = kSide / std::max(high[0] - low[0], high[1] - low[1]);
+  sheet.width = static_cast<int>(std::ceil(scale * (high[0] - low[0]) + 2 * kMargin));
+  sheet.height = static_cast<int>(std::ceil(scale * (high[1] - low[1]) + 2 * kMargin + kFoot));
+  sheet.width = std::max(sheet.width, 420);
+  const auto at = [&](const cv::Point2d& p) {
+    return cv::Point2d(kMargin + scale * (p.x - low[0]), kMargin + scale * (high[1] - p.y));
+  };
+  const auto all_at = [&](const std::vector<cv::Point2d>& points) {
+    std::vector<cv::Point2d> placed;
+    for (const cv::Point2d& p : points) placed.push_back(at(p));
+    return placed;
+  };
+  for (const auto& outline : plan.free)
+    sheet.shapes.push_back({Shape::kArea, all_at(outline), 1, kFree, ""});
+  for (const cv::Point2d& p : plan.upright)
+    if (p.x >= low[0] && p.y >= low[1] && p.x <= high[0] && p.y <= high[1])
+      sheet.shapes.push_back({Shape::kDot, {at(p)}, scale * plan.cell, kUpright, ""});
+  sheet.shapes.push_back({Shape::kLine, all_at(plan.path), 1.2, kPath, ""});
+  for (const PlanLine& line : plan.lines)
+    sheet.shapes.push_back({Shape::kLine,
+                            {at(line.a), at(line.b)},
+                            line.is_wall ? 5.0 : 2.5,
+                            line.is_wall ? kWall : kOther,
+                            ""});
+  const std::string unit = scene.is_metric ? " m" : "";
+  const double bar = round_below(0.25 * sheet.width / scale);
+  const double y = sheet.height - 34, x = kMargin;
+  sheet.shapes.push_back({Shape::kLine, {{x, y}, {x + scale * bar, y}}, 3, kWall, ""});
+  for (const double end : {x, x + scale * bar})
+    sheet.shapes.push_back({Shape::kLine, {{end, y - 6}, {end, y + 6}}, 2, kWall, ""});
+  sheet.shapes.push_back({Shape::kText, {{x, y - 12}}, 10, kWall, short_number(bar) + unit});
+  const std::string words =
+      short_number(plan.area) + (scene.is_metric ? " m2" : " squares of the path's unit") +
+      " of floor; " + short_number(model.size[0]) + " x " + short_number(model.size[1]) + unit;
+  sheet.shapes.push_back({Shape::kText, {{x, y + 24}}, 10, kOther, words});
+  return sheet;
+}
+
+std::string point_text(const cv::Point2d& p) {
+  char text[48];
+  std::snprintf(text, sizeof text, "%.1f,%.1f", p.x, p.y);
+  return text;
+}
+
+cv::Scalar bgr_of(const char* colour) {
+  unsigned value = 0;
+  std::sscanf(colour, "#%x", &value);
+  return cv::Scalar(value & 255, value >> 8 & 255, value >> 16 & 255);
+}
+
+}  // namespace
+
+FreeArea::FreeArea(const RoomModel& model) : axes_(model.axes), near_(4 * model.voxel) {
+  constexpr int kMostCells = 1000;  // a side
+  double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
+  for (const tv_room_vertex& v : model.vertices) {
+    const Vector3 point = position_of(v);
+    surface_.push_back(key_of(point));
+    const Vector3 at = applied(axes_, point);
+    for (size_t k = 0; k < 2; ++k) {
+      low[k] = std::min(low[k], at[k]);
+      high[k] = std::max(high[k], at[k]);
+    }
+  }
+  std::sort(surface_.begin(), surface_.end());
+  surface_.erase(std::unique(surface_.begin(), surface_.end()), surface_.end());
+  if (surface_.empty()) return;
+  const double side = std::max(high[0] - low[0], high[1] - low[1]);
+  cell_ = std::max(1.5 * model.voxel, side / kMostCells);
+  origin_ = {low[0] - cell_, low[1] - cell_};
+  counts_ = cv::Mat::zeros(static_cast<int>((high[1] - low[1]) / cell_) + 3,
+                           static_cast<int>((high[0] - low[0]) / cell_) + 3, CV_8U);
+}
+
+int64_t FreeArea::key_of(const Vector3& point) const {
+  int64_t key = 0;
+  for (const double value : point)
+    key = key << 21 | (static_cast<int64_t>(std::floor(value / near_)) & 0x1fffff);
+  return key;
+}
+
+void FreeArea::add_ray(const Vector3& centre, const Vector3& hit) {
+  if (!std::binary_search(surface_.begin(), surface_.end(), key_of(hit))) return;
+  const cv::Point2d from = (from_above(axes_, centre) - origin_) / cell_;
+  const cv::Point2d to = (from_above(axes_, hit) - origin_) / cell_;
+  const int steps = static_cast<int>(std::max(std::abs(to.x - from.x), std::abs(to.y - from.y)));
+  for (int k = 0; k <= steps; ++k) {
+    const cv::Point2d at = from + (k / std::max(1.0, static_cast<double>(steps))) * (to - from);
+    const int x = static_cast<int>(std::floor(at.x)), y = static_cast<int>(std::floor(at.y));
+    if (x < 0 || y < 0 || x >= counts_.cols || y >= counts_.rows) continue;
+    uint8_t& count = counts_.at<uint8_t>(y, x);
+    if (count < 255) ++count;
+  }
+}
+
+cv::Mat FreeArea::cells() const {
+  if (counts_.empty()) return cv::Mat::zeros(1, 1, CV_8U);
+  cv::Mat free = counts_ >= kFewestRays;
+  cv::morphologyEx(free, free, cv::MORPH_CLOSE, cv::Mat::ones(3, 3, CV_8U));
+  return free;
+}
+
+RoomPlan plan_of(const RoomScene& scene, const RoomModel& model) {
+  RoomPlan plan;
+  plan.cell = 1.5 * model.voxel;
+  add_free_area(model, plan);
+  add_lines(model, plan);
+  std::set<std::pair<int, int>> cells;
+  for (const tv_room_vertex& v : model.vertices) {
+    if (std::abs(dot(normal_of(v), model.up)) > kUprightNormal) continue;
+    const cv::Point2d at = from_above(model.axes, position_of(v)) / plan.cell;
+    cells.emplace(static_cast<int>(std::floor(at.x)), static_cast<int>(std::floor(at.y)));
+  }
+  for (const auto& [x, y] : cells)
+    plan.upright.push_back(plan.cell * cv::Point2d(x + 0.5, y + 0.5));
+  for (const RoomView& view : scene.views) plan.path.push_back(from_above(model.axes, view.t));
+  return plan;
+}
+
+std::string plan_svg(const RoomPlan& plan, const RoomScene& scene, const RoomModel& model) {
+  const Drawing sheet = drawing_of(plan, scene, model);
+  const std::string width = std::to_string(sheet.width), height = std::to_string(sheet.height);
+  std::string svg = "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"" + width + "\" height=\"" +
+                    height + "\" viewBox=\"0 0 " + width + " " + height +
+                    "\" font-family=\"sans-serif\">\n<rect width=\"100%\" height=\"100%\" fill=\"" +
+                    kPaper + "\"/>\n";
+  for (const Shape& shape : sheet.shapes) {
+    std::string points;
+    for (const cv::Point2d& p : shape.points) points += (points.empty() ? "" : " ") + point_text(p);
+    const std::string colour = shape.colour, size = short_number(shape.size);
+    switch (shape.kind) {
+      case Shape::kArea:
+        svg += "<polygon fill=\"" + colour + "\" points=\"" + points + "\"/>\n";
+        break;
+      case Shape::kLine:
+        svg += "<polyline fill=\"none\" stroke=\"" + colour + "\" stroke-width=\"" + size +
+               "\" points=\"" + points + "\"/>\n";
+        break;
+      case Shape::kDot: {
+        const cv::Point2d half(shape.size / 2, shape.size / 2);
+        const std::string corner = point_text(shape.points[0] - half);
+        const size_t comma = corner.find(',');
+        svg += "<rect x=\"" + corner.substr(0, comma) + "\" y=\"" + corner.substr(comma + 1) +
+               "\" width=\"" + size + "\" height=\"" + size + "\" fill=\"" + colour + "\"/>\n";
+        break;
+      }
+      case Shape::kText: {
+        const size_t comma = points.find(',');
+        svg += "<text x=\"" + points.substr(0, comma) + "\" y=\"" + points.substr(comma + 1) +
+               "\" font-size=\"" + short_number(1.4 * shape.size) + "\" fill=\"" + colour + "\">" +
+               shape.text + "</text>\n";
+        break;
+      }
+    }
+  }
+  return svg + "</svg>\n";
+}
+
+cv::Mat plan_picture(const RoomPlan& plan, const RoomScene& scene, const RoomModel& model) {
+  const Drawing drawing = drawing_of(plan, scene, model);
+  cv::Mat sheet(drawing.height, drawing.width, CV_8UC3, bgr_of(kPaper));
+  for (const Shape& shape : drawing.shapes) {
+    const cv::Scalar colour = bgr_of(shape.colour);
+    switch (shape.kind) {
+      case Shape::kArea: {
+        std::vector<cv::Point> points(shape.points.begin(), shape.points.end());
+        cv::fillPoly(sheet, std::vector<std::vector<cv::Point>>{points}, colour, cv::LINE_AA);
+        break;
+      }
+      case Shape::kLine:
+        for (size_t k = 1; k < shape.points.size(); ++k)
+          put_line(sheet, shape.points[k - 1], shape.points[k], colour,
+                   std::max(1, static_cast<int>(std::lround(shape.size))));
+        break;
+      case Shape::kDot: {
+        const cv::Point2d half(shape.size / 2, shape.size / 2);
+        cv::rectangle(sheet, shape.points[0] - half, shape.points[0] + half, colour, cv::FILLED);
+        break;
+      }
+      case Shape::kText: put_text(sheet, shape.text, shape.points[0], shape.size, colour); break;
+    }
+  }
+  return sheet;
+}
+
+}  // namespace cli
