@@ -42,7 +42,7 @@ def test_options_and_values_of_matches_reach_the_library(context, scene):
     with pytest.raises(ValueError, match="199 points"):
         tv.estimate_absolute_pose(context, scene.camera, pixels, scene.points[1:])
     with pytest.raises(TypeError, match="float64"):
-        tv.estimate_absolute_pose(context, scene.camera, pixels.astype(np.float32), scene.points)
+        tv.estimate_absolute_pose(context, scene.camera, pixels.astype(complex), scene.points)
     with pytest.raises(TypeError, match="no option 'gravity'|unexpected"):
         tv.estimate_absolute_pose(context, scene.camera, pixels, scene.points, gravity=(0, 0, 1))
 

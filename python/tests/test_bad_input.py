@@ -44,9 +44,11 @@ def test_a_mask_of_another_shape(context, image):
 
 
 @pytest.mark.parametrize("bad, kind, words", [
-    (np.zeros((4, 128), np.float32), TypeError, "uint8"),
+    (np.full((4, 128), 0.5, np.float32), TypeError, "uint8.*float32 do not fit"),
+    (np.full((4, 128), 256), TypeError, "uint8.*do not fit"),
+    (np.full((4, 128), -1), TypeError, "uint8.*do not fit"),
+    (np.zeros((4, 128), bool), TypeError, "uint8.*bool"),
     (np.zeros((4, 64), np.uint8), ValueError, r"\(n, 128\)"),
-    (np.zeros((4, 256), np.uint8)[:, ::2], ValueError, "contiguous"),
     (np.zeros(128, np.uint8), ValueError, r"\(n, 128\)"),
 ])
 def test_descriptors(context, bad, kind, words):
@@ -58,9 +60,11 @@ def test_descriptors(context, bad, kind, words):
 
 
 @pytest.mark.parametrize("bad, kind, words", [
-    (np.zeros((200, 2), np.float32), TypeError, "float64"),
-    (np.zeros((200, 3)), ValueError, r"\(n, 2\)"),
-    (np.zeros((400, 2))[::2], ValueError, "contiguous"),
+    (np.zeros((200, 2), complex), TypeError, "float64.*complex"),
+    ([["1", "2"]] * 200, TypeError, "float64.*list"),
+    ([[1, 2], [3]] * 100, TypeError, "float64.*list"),
+    (None, TypeError, "float64.*None"),
+    (np.zeros((200, 3), np.float32), ValueError, r"\(n, 2\)"),
     (np.zeros((199, 2)), ValueError, "199"),
 ])
 def test_pixels(context, scene, bad, kind, words):

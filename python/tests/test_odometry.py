@@ -12,8 +12,7 @@ DEPTHS = (2.5, 6.0, 3.5, 8.0, 4.5)  # of the walls, one above the other in the i
 CAMERA = tv.Camera(WIDTH, HEIGHT, FOCAL, FOCAL, (WIDTH - 1) / 2, (HEIGHT - 1) / 2)
 
 
-@pytest.fixture(scope="module")
-def frames():
+def flown_frames():
     """Twenty frames of a camera that flies to the right, 0.08 units a frame."""
     noise = np.random.default_rng(11).integers(0, 256, (HEIGHT + 4, 3 * WIDTH + 4))
     wide = sum(noise[y:y + HEIGHT, x:x + 3 * WIDTH] for y in range(5) for x in range(5)) / 25
@@ -29,6 +28,11 @@ def frames():
         frame = (1 - share) * wide[row, left] + share * wide[row, left + 1]
         made.append(np.rint(frame).astype(np.uint8))
     return made
+
+
+@pytest.fixture(scope="module")
+def frames():
+    return flown_frames()
 
 
 @pytest.fixture(scope="module")

@@ -217,7 +217,7 @@ except tv.TV_ERR_CAMERA as error:
 '''
 MISTAKES = {
     "tv.reconstrukt": "attr-defined",
-    "tv.Camera(8, 8, '5', 5.0, 3.5, 3.5)": "arg-type",
+    "tv.Camera(8, 8, '5', 5.0, 3.5, 3.5)": "call-overload",
     "tv.camera_scale(None, 0.5)": "arg-type",
     "tv.FeatureOptions(arcs=9)": "call-arg",
     "tv.version_string().Foo": "attr-defined",

@@ -106,7 +106,7 @@ def test_what_c_could_not_read_is_refused():
             room.add(CAMERA, np.eye(3), [0.0, 0.0, 0.0], distance, **keywords)
 
         with pytest.raises(TypeError):
-            give(wall().astype(float))
+            give(wall().astype(complex))
         with pytest.raises(TypeError):
             room.add(None, np.eye(3), [0.0, 0.0, 0.0], wall())
         with pytest.raises(ValueError):

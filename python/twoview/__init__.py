@@ -3,14 +3,20 @@
 The functions have the names of the C API without tv_. Images are read without a copy. Calls release
 the interpreter's lock. docs/python.md has an example.
 
-Every function raises TypeError for an argument of another type or dtype and ValueError for another
-shape, before C is called. A status of C is an exception of its name, a subclass of StatusError:
-TV_ERR_ARGUMENT (out of its range), TV_ERR_NOT_FINITE, TV_ERR_LIMITS (above the limits of the
-context), TV_ERR_CAMERA, TV_ERR_OUTSIDE (beyond what a lens model is valid for) and others.
+Arrays of numbers may be of any real dtype, lists, or not contiguous: what has not the dtype that a
+function names is converted to it. Images, keypoints, matches and points are taken as they are.
+Camera(K) takes a 3x3 matrix; twoview.plot draws matches, epipolar lines and clouds (matplotlib).
+
+Every function raises TypeError for an argument of another type or with numbers that do not fit into
+the dtype, and ValueError for another shape, before C is called. A status of C is an exception of
+its name, a subclass of StatusError: TV_ERR_ARGUMENT (out of its range), TV_ERR_NOT_FINITE,
+TV_ERR_LIMITS (above the limits of the context), TV_ERR_CAMERA, TV_ERR_OUTSIDE (beyond what a lens
+model is valid for) and others.
 "No geometry" is a result: it is in TwoView.verdict."""
 
 import typing as _typing
 
+from . import plot as plot
 from ._abi import (CORRESPONDENCE, DENSE_POINT, DESCRIPTOR_BYTES, DISTANCE_PRIOR,
                    GRAVITY_PRIOR, KEYPOINT,
                    MAP_OBSERVATION, MAP_POINT, OBSERVATION, POINT, POSE_PRIOR,
@@ -85,6 +91,7 @@ __all__ = [
     "camera_undistort", "camera_unproject_points", "camera_valid_angle", "correct_matches",
     "corrected_camera", "default_library", "densify", "describe", "detect",
     "estimate_absolute_pose", "estimate_two_view", "extract", "format_cameras",
-    "keypoint_sigmas", "match", "match_guided", "orient", "parse_cameras", "point_covariances",
+    "keypoint_sigmas", "match", "match_guided", "orient", "parse_cameras",
+    "point_covariances",
     "read_camera", "read_cameras", "read_sigmas", "reconstruct", "sweep_depth", "triangulate",
     "version_string", "write_cameras"]

@@ -547,23 +547,49 @@ def pointer(array: Optional[np.ndarray]) -> Optional[c_void_p]:
     return None if array is None else c_void_p(array.ctypes.data)
 
 
+def _numbers(name: str, values: Any, dtype: np.dtype) -> np.ndarray:
+    """An array of any real numbers, or a list of them, as an array of this dtype. Raises TypeError
+    for what is none, and for numbers that the dtype would cut off."""
+    try:
+        array = np.asarray(values)
+    except ValueError:  # rows of different lengths
+        array = np.asarray(values, object)
+    if array.size == 0 and array.dtype == np.float64:
+        return array.astype(dtype)
+    if array.dtype.kind not in "fiu":
+        given = array.dtype if isinstance(values, np.ndarray) else type(values).__name__
+        raise TypeError(f"{name}: dtype {dtype} is expected, or numbers that become it, not "
+                        f"{given}")
+    # What overflows, or is no whole number of a byte, shows in the comparison.
+    with np.errstate(invalid="ignore", over="ignore"):
+        converted = array.astype(dtype)
+        is_same = (np.array_equal(converted, array) if dtype.kind in "iu" else
+                   np.array_equal(np.isfinite(converted), np.isfinite(array)))
+    if not is_same:
+        raise TypeError(f"{name}: dtype {dtype} is expected, and these numbers of {array.dtype} do "
+                        "not fit into it")
+    return converted
+
+
 def check_array(name: str, array: Any, dtype: Any, *columns: int) -> np.ndarray:
-    """Returns the caller's array without a copy. Raises TypeError or ValueError if C could not read
-    it."""
-    if not isinstance(array, np.ndarray):
+    """Returns the caller's array as C reads it: without a copy where it has this dtype and is
+    contiguous, else converted. Raises TypeError or ValueError if that cannot be. The caller keeps
+    the result for as long as C reads it."""
+    dtype = np.dtype(dtype)
+    if not isinstance(array, np.ndarray) and dtype.names:
         raise TypeError(f"{name}: a numpy array is expected, not {type(array).__name__}")
+    if not isinstance(array, np.ndarray) or (array.dtype != dtype and not dtype.names):
+        array = _numbers(name, array, dtype)
+        if array.shape == (0,):  # an empty list
+            array = array.reshape(0, *columns)
     if array.dtype != dtype:
-        raise TypeError(f"{name}: dtype {np.dtype(dtype)} is expected, not {array.dtype}")
+        raise TypeError(f"{name}: dtype {dtype} is expected, not {array.dtype}")
     if array.ndim != 1 + len(columns) or array.shape[1:] != columns:
         shape = "(n" + "".join(f", {c}" for c in columns) + ("," if not columns else "") + ")"
         raise ValueError(f"{name}: shape {shape} is expected, not {array.shape}")
-    if not array.flags.c_contiguous:
-        raise ValueError(f"{name}: not contiguous; numpy.ascontiguousarray makes a copy that is")
-    if not array.flags.aligned:
-        raise ValueError(f"{name}: not aligned")
     if len(array) > 2**31 - 1:
         raise ValueError(f"{name}: too long")
-    return array
+    return np.require(array, requirements=("C", "A"))
 
 
 def small_array(name: str, values: Any, *shape: int) -> np.ndarray:

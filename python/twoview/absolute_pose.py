@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Optional
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from . import _abi
 from ._record import Record, judged, rotation, table, vector
@@ -47,10 +48,10 @@ class AbsolutePose(Record):
         return table(rows)
 
 
-def estimate_absolute_pose(context: Context, camera: Camera, pixels: np.ndarray,
-                           points: np.ndarray, ratios: Optional[np.ndarray] = None,
+def estimate_absolute_pose(context: Context, camera: Camera, pixels: ArrayLike,
+                           points: ArrayLike, ratios: Optional[ArrayLike] = None,
                            options: Optional[AbsolutePoseOptions] = None,
-                           sigmas: Optional[np.ndarray] = None,
+                           sigmas: Optional[ArrayLike] = None,
                            **keywords: Any) -> tuple[AbsolutePose, np.ndarray]:
     """tv_estimate_absolute_pose: the pose of a camera from pixels of known points.
 
@@ -69,18 +70,20 @@ def estimate_absolute_pose(context: Context, camera: Camera, pixels: np.ndarray,
     matches = context.library.make(_abi.tv_pixel_points)
     matches.num = len(pixels)
     matches.pixels, matches.points = _abi.pointer(pixels), _abi.pointer(points)
+    kept: list[np.ndarray] = [points]  # the struct only points to them
     for name, array in (("points", points), ("ratios", ratios), ("sigmas", sigmas)):
         if array is None:
             continue
         if name != "points":
-            array = _abi.check_array(name, array, np.float32)
-            setattr(matches, name, _abi.pointer(array))
-        if len(array) != len(pixels):
-            raise ValueError(f"{len(pixels)} pixels and {len(array)} {name}")
+            kept.append(_abi.check_array(name, array, np.float32))
+            setattr(matches, name, _abi.pointer(kept[-1]))
+        if len(kept[-1]) != len(pixels):
+            raise ValueError(f"{len(pixels)} pixels and {len(kept[-1])} {name}")
     found = context.library.make(_abi.tv_absolute_pose)
     inliers = np.zeros(len(pixels), np.uint8)
     context.call("tv_estimate_absolute_pose", byref(camera_struct("camera", camera)),
                  byref(matches), byref(wanted), byref(found), _abi.pointer(inliers))
+    del kept
 
     def array_of(field: str, has: int, *shape: int) -> Optional[np.ndarray]:
         return np.array(getattr(found, field)).reshape(shape) if has else None

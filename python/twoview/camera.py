@@ -5,18 +5,24 @@ from __future__ import annotations
 
 import ctypes
 from dataclasses import dataclass
-from typing import Any, Sequence
+from typing import Any, Optional, Sequence, overload
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from . import _abi
 from .enums import CameraModel
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class Camera:
     """tv_camera: a camera's intrinsics. Two cameras are equal when the library sees the same
-    numbers: zeros at the end of k make no difference. read_camera makes one from a file."""
+    numbers: zeros at the end of k make no difference. read_camera makes one from a file.
+
+    Camera(width, height, fx, fy, cx, cy, model, k), or Camera(K) of a 3x3 matrix, with `size`,
+    (width, height), and `distortion`, OpenCV's coefficients: at most 8, of BROWN_CONRADY unless
+    `model` is another. Without `size` the image is as large as if its centre were the principal
+    point."""
 
     width: int  #: of the image, pixels
     height: int  #: of the image, pixels
@@ -29,9 +35,46 @@ class Camera:
     #: of KANNALA_BRANDT, none of a PINHOLE. Those that are left out are 0.
     k: Sequence[float] = ()
 
-    def __post_init__(self) -> None:
-        if not isinstance(self.k, tuple):  # a list or an array has no hash
-            object.__setattr__(self, "k", tuple(float(k) for k in self.k))
+    @overload
+    def __init__(self, width: int, height: int, fx: float, fy: float, cx: float, cy: float,
+                 model: int = ..., k: Sequence[float] = ...) -> None: ...
+
+    @overload
+    def __init__(self, width: Any, *, size: Optional[Sequence[int]] = ...,
+                 distortion: Any = ..., model: Optional[int] = ...) -> None: ...
+
+    def __init__(self, width: Any, height: Any = None, fx: Any = None, fy: Any = None,
+                 cx: Any = None, cy: Any = None, model: Any = None, k: Any = (), *,
+                 size: Any = None, distortion: Any = ()) -> None:
+        if np.ndim(width) != 0:
+            if any(value is not None for value in (height, fx, fy, cx, cy)) or len(k):
+                raise TypeError("Camera(K): the matrix has the focal lengths and the principal "
+                                "point; give size=(width, height) and distortion= beside it")
+            width, height, fx, fy, cx, cy = _of_matrix(width, size)
+            k = np.ravel(distortion).tolist()
+            while k and k[-1] == 0:
+                k.pop()
+            if model is None and k:
+                model = CameraModel.BROWN_CONRADY
+            if len(k) > 8:
+                raise ValueError(f"distortion: {len(k)} coefficients, of which at most 8 are not 0 "
+                                 "(no thin prism and no tilted sensor)")
+        else:
+            missing = [name for name, value in (("height", height), ("fx", fx), ("fy", fy),
+                                                ("cx", cx), ("cy", cy)) if value is None]
+            if missing:
+                raise TypeError(f"Camera: {', '.join(missing)} missing; Camera(K) takes a 3x3 "
+                                "matrix")
+            if size is not None or len(np.ravel(distortion)):
+                raise TypeError("Camera: size and distortion are of Camera(K); here they are "
+                                "width, height and k")
+        if not isinstance(k, tuple):  # a list or an array has no hash
+            k = tuple(float(value) for value in k)
+        if model is None:
+            model = CameraModel.PINHOLE
+        for name, value in (("width", width), ("height", height), ("fx", fx), ("fy", fy),
+                            ("cx", cx), ("cy", cy), ("model", model), ("k", k)):
+            object.__setattr__(self, name, value)
 
     def _key(self) -> tuple[object, ...]:
         k = list(self.k)
@@ -77,6 +120,29 @@ class Camera:
                       sy * (self.cy + 0.5) - 0.5, self.model, self.k)
 
 
+def _of_matrix(matrix: Any, size: Any) -> tuple[int, int, float, float, float, float]:
+    """width, height, fx, fy, cx and cy of K. Raises ValueError that names what K is not."""
+    K = np.asarray(matrix, np.float64)
+    if K.shape != (3, 3):
+        raise ValueError(f"K: shape (3, 3) is expected, not {K.shape}")
+    if not np.isfinite(K).all():
+        raise ValueError("K: a number is not finite")
+    if K[1, 0] != 0 or K[2].tolist() != [0, 0, 1]:
+        raise ValueError("K: not [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]")
+    if K[0, 1] != 0:
+        raise ValueError("K: skew, which is not supported")
+    if not (K[0, 0] > 0 and K[1, 1] > 0):
+        raise ValueError("K: a focal length that is not above 0")
+    if size is None:
+        size = [round(2 * center + 1) for center in K[:2, 2]]
+        if min(size) < 1:
+            raise ValueError("K: the principal point is not in an image; give size=(width, height)")
+    if np.shape(size) != (2,):
+        raise ValueError(f"size: (width, height) is expected, not {size!r}")
+    return (int(size[0]), int(size[1]), float(K[0, 0]), float(K[1, 1]), float(K[0, 2]),
+            float(K[1, 2]))
+
+
 def camera_struct(name: str, camera: Any) -> Any:
     if isinstance(camera, _abi.tv_camera):
         return camera
@@ -106,7 +172,7 @@ def camera_valid_angle(camera: Camera) -> float:
     return angle.value
 
 
-def _points(function: str, camera: Camera, name: str, given: np.ndarray, columns: int,
+def _points(function: str, camera: Camera, name: str, given: ArrayLike, columns: int,
             out_columns: int) -> tuple[np.ndarray, np.ndarray]:
     given = _abi.check_array(name, given, np.float64, columns)
     out = np.empty((len(given), out_columns))
@@ -117,7 +183,7 @@ def _points(function: str, camera: Camera, name: str, given: np.ndarray, columns
     return out, inside.view(bool)
 
 
-def camera_project_points(camera: Camera, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def camera_project_points(camera: Camera, points: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     """tv_camera_project_points: where the camera sees points.
 
     camera: of any model. points: (n, 3) float64 in the camera's frame, of any unit (x right, y
@@ -128,7 +194,7 @@ def camera_project_points(camera: Camera, points: np.ndarray) -> tuple[np.ndarra
     return _points("tv_camera_project_points", camera, "points", points, 3, 2)
 
 
-def camera_unproject_points(camera: Camera, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def camera_unproject_points(camera: Camera, pixels: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     """tv_camera_unproject_points: the directions in which the camera sees pixels.
 
     camera: of any model. pixels: (n, 2) float64, distorted as in the image.

@@ -200,7 +200,7 @@ def depth_map(library: _abi.Library, distance: np.ndarray, sigma: Optional[np.nd
         raise ValueError(f"distance: shape (height, width) is expected, not {shape}")
     fields: dict[str, Any] = {"width": shape[1], "height": shape[0], "stride": shape[1],
                               "inferred": int(inferred)}
-    kept = []
+    kept: list[np.ndarray] = []
     for name, array, dtype in (("distance", distance, np.float32), ("sigma", sigma, np.float32),
                                ("witnesses", witnesses, np.uint8)):
         if array is None:
@@ -208,12 +208,12 @@ def depth_map(library: _abi.Library, distance: np.ndarray, sigma: Optional[np.nd
         if np.shape(array) != shape:
             raise ValueError(f"{name}: shape {shape} is expected, not {np.shape(array)}")
         kept.append(_abi.check_array(name, array, dtype, shape[1]))
-        fields[name] = array.ctypes.data
+        fields[name] = kept[-1].ctypes.data
     if pixels is not None:
         if np.shape(pixels) not in (shape, (*shape, 3)):
             raise ValueError(f"pixels: shape {shape} or {(*shape, 3)} is expected, not "
                              f"{np.shape(pixels)}")
         kept.append(_abi.check_array("pixels", pixels, np.uint8, *np.shape(pixels)[1:]))
-        fields.update(pixels=pixels.ctypes.data, channels=1 if pixels.ndim == 2 else 3,
-                      pixel_stride_bytes=pixels.strides[0])
+        fields.update(pixels=kept[-1].ctypes.data, channels=1 if kept[-1].ndim == 2 else 3,
+                      pixel_stride_bytes=kept[-1].strides[0])
     return library.make(_abi.tv_depth_map, fields), kept

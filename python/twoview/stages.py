@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Optional, Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from . import _abi
 from ._record import Record, judged, largest_sigma, rotation, table, vector
@@ -105,12 +106,13 @@ def extract(context: Context, image: np.ndarray, mask: Optional[np.ndarray] = No
     return keypoints[: count.value].copy(), descriptors[: count.value].copy()
 
 
-def _descriptors(name: str, array: np.ndarray) -> np.ndarray:
+def _descriptors(name: str, array: ArrayLike) -> np.ndarray:
     return _abi.check_array(name, array, np.uint8, _abi.DESCRIPTOR_BYTES)
 
 
 def _features(context: Context, keypoints: Optional[np.ndarray], descriptors: np.ndarray) -> Any:
     features = context.library.make(_abi.tv_features)
+    features.kept = keypoints, descriptors  # the struct only points to them
     features.num = len(descriptors)
     features.keypoints, features.descriptors = _abi.pointer(keypoints), _abi.pointer(descriptors)
     return features
@@ -136,9 +138,10 @@ def keypoint_sigmas(keypoints: np.ndarray, exponent: float,
 
 
 def _pairs(context: Context, pixels0: np.ndarray, pixels1: np.ndarray,
-           **values: Optional[np.ndarray]) -> Any:
+           **values: Any) -> Any:
     """A tv_pixel_pairs; values: ratios, sigmas0, sigmas1, each (n,) float32 or None."""
     pairs = context.library.make(_abi.tv_pixel_pairs)
+    pairs.kept = [pixels0, pixels1]  # the struct only points to them
     pairs.num = len(pixels0)
     pairs.pixels0, pairs.pixels1 = _abi.pointer(pixels0), _abi.pointer(pixels1)
     for name, array in values.items():
@@ -147,11 +150,12 @@ def _pairs(context: Context, pixels0: np.ndarray, pixels1: np.ndarray,
         array = _abi.check_array(name, array, np.float32)
         if len(array) != len(pixels0):
             raise ValueError(f"{len(array)} {name} and {len(pixels0)} matches")
+        pairs.kept.append(array)
         setattr(pairs, name, _abi.pointer(array))
     return pairs
 
 
-def match(context: Context, descriptors0: np.ndarray, descriptors1: np.ndarray,
+def match(context: Context, descriptors0: ArrayLike, descriptors1: ArrayLike,
           options: Optional[MatchOptions] = None, keypoints0: Optional[np.ndarray] = None,
           keypoints1: Optional[np.ndarray] = None, **keywords: Any) -> np.ndarray:
     """tv_match: mutual nearest neighbours that pass the ratio test in both directions.
@@ -228,7 +232,7 @@ def _two_cameras(camera0: Optional[Camera], camera1: Optional[Camera]) -> list[A
 
 def match_guided(context: Context, camera0: Optional[Camera], camera1: Optional[Camera],
                  epipolar: Sequence[Sequence[float]], keypoints0: np.ndarray,
-                 descriptors0: np.ndarray, keypoints1: np.ndarray, descriptors1: np.ndarray,
+                 descriptors0: ArrayLike, keypoints1: np.ndarray, descriptors1: ArrayLike,
                  options: Optional[GuidedOptions] = None, **keywords: Any) -> np.ndarray:
     """tv_match_guided: matches along epipolar lines.
 
@@ -382,7 +386,7 @@ def corrected_camera(found: TwoView, camera: Camera) -> Camera:
                    cx=camera.cx + float(shift[0]), cy=camera.cy + float(shift[1]))
 
 
-def _pixels(pixels0: np.ndarray, pixels1: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _pixels(pixels0: ArrayLike, pixels1: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     pixels0 = _abi.check_array("pixels0", pixels0, np.float64, 2)
     pixels1 = _abi.check_array("pixels1", pixels1, np.float64, 2)
     if len(pixels0) != len(pixels1):
@@ -391,8 +395,8 @@ def _pixels(pixels0: np.ndarray, pixels1: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def _estimate(context: Context, camera0: Optional[Camera], camera1: Optional[Camera],
-              pixels0: np.ndarray, pixels1: np.ndarray, wanted: Any,
-              **values: Optional[np.ndarray]) -> tuple[Any, np.ndarray]:
+              pixels0: ArrayLike, pixels1: ArrayLike, wanted: Any,
+              **values: Optional[ArrayLike]) -> tuple[Any, np.ndarray]:
     pixels0, pixels1 = _pixels(pixels0, pixels1)
     pairs = _pairs(context, pixels0, pixels1, **values)
     found = context.library.make(_abi.tv_two_view)
@@ -403,10 +407,10 @@ def _estimate(context: Context, camera0: Optional[Camera], camera1: Optional[Cam
 
 
 def estimate_two_view(context: Context, camera0: Optional[Camera], camera1: Optional[Camera],
-                      pixels0: np.ndarray, pixels1: np.ndarray,
-                      ratios: Optional[np.ndarray] = None,
+                      pixels0: ArrayLike, pixels1: ArrayLike,
+                      ratios: Optional[ArrayLike] = None,
                       options: Optional[EstimateOptions] = None,
-                      sigmas0: Optional[np.ndarray] = None, sigmas1: Optional[np.ndarray] = None,
+                      sigmas0: Optional[ArrayLike] = None, sigmas1: Optional[ArrayLike] = None,
                       **keywords: Any) -> tuple[TwoView, np.ndarray]:
     """tv_estimate_two_view: the geometry of matched pixels.
 
@@ -429,7 +433,7 @@ def estimate_two_view(context: Context, camera0: Optional[Camera], camera1: Opti
 
 
 def triangulate(camera0: Camera, camera1: Camera, R: Sequence[Sequence[float]],
-                t: Sequence[float], pixels0: np.ndarray, pixels1: np.ndarray,
+                t: Sequence[float], pixels0: ArrayLike, pixels1: ArrayLike,
                 method: int = Triangulation.ITERATIVE_LS) -> np.ndarray:
     """tv_triangulate: the points that two cameras see.
 
@@ -451,7 +455,7 @@ def triangulate(camera0: Camera, camera1: Camera, R: Sequence[Sequence[float]],
 
 
 def correct_matches(camera0: Camera, camera1: Camera, R: Sequence[Sequence[float]],
-                    t: Sequence[float], pixels0: np.ndarray, pixels1: np.ndarray,
+                    t: Sequence[float], pixels0: ArrayLike, pixels1: ArrayLike,
                     cost: int = Triangulation.POLY) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """tv_correct_matches: pixels moved as little as possible so that their rays meet.
 
@@ -496,10 +500,10 @@ class BundleResult(Record):
                       ("rotation", rotation(self.R)), ("t", vector(self.t))])
 
 
-def adjust_two_view(context: Context, camera0: Camera, camera1: Camera, pixels0: np.ndarray,
-                    pixels1: np.ndarray, R: Sequence[Sequence[float]], t: Sequence[float],
+def adjust_two_view(context: Context, camera0: Camera, camera1: Camera, pixels0: ArrayLike,
+                    pixels1: ArrayLike, R: Sequence[Sequence[float]], t: Sequence[float],
                     points: np.ndarray, options: Optional[BundleOptions] = None,
-                    sigmas0: Optional[np.ndarray] = None, sigmas1: Optional[np.ndarray] = None,
+                    sigmas0: Optional[ArrayLike] = None, sigmas1: Optional[ArrayLike] = None,
                     **keywords: Any) -> BundleResult:
     """tv_adjust_two_view: bundle adjustment of a pose and its points from a given start, which is
     not modified.
