@@ -102,6 +102,13 @@ def test_a_known_frame_is_located(frames, flight):
     assert blank.status == tv.OdometryStatus.LOST and blank.t is None
     with pytest.raises(ValueError, match="no pose"):
         odometry.pose_of(blank)
+    mask = np.ones((HEIGHT, WIDTH), bool)
+    assert np.array_equal(odometry.locate(frames[15], mask=mask).t, found.t)
+    mask[:, 2 * WIDTH // 3:] = False
+    assert odometry.locate(frames[15], mask=mask).num_inliers < found.num_inliers
+    assert odometry.locate(frames[15], mask=mask & False).num_keypoints == 0
+    with pytest.raises(ValueError, match="mask"):
+        odometry.locate(frames[15], mask=mask[1:])
 
 
 def test_bad_input_is_refused(frames):

@@ -445,6 +445,10 @@ class TV_ERR_STRIDE(StatusError, ValueError):
     status = Status.ERR_STRIDE
 
 
+class TV_ERR_MASK(StatusError, ValueError):
+    status = Status.ERR_MASK
+
+
 ERRORS = {int(kind.status): kind for kind in StatusError.__subclasses__()}
 
 

@@ -22,6 +22,7 @@ class Status(IntEnum):
     ERR_MAP = 13
     ERR_TIME = 14
     ERR_STRIDE = 15
+    ERR_MASK = 16
 
 
 class Kernels(IntEnum):

@@ -237,8 +237,8 @@ static void test_bad_frames_are_refused(void) {
   frame.time_s = NAN, expect_refused(TV_ERR_NOT_FINITE), frame = good;
   frame.time_s = INFINITY, expect_refused(TV_ERR_NOT_FINITE), frame = good;
   frame.image.data = (const uint8_t *)&state, expect_refused(TV_ERR_OVERLAP), frame = good;
-  frame.mask = good.image, frame.mask.width -= 1, expect_refused(TV_ERR_ARGUMENT), frame = good;
-  frame.mask = good.image, frame.mask.stride_bytes = 3, expect_refused(TV_ERR_ARGUMENT);
+  frame.mask = good.image, frame.mask.width -= 1, expect_refused(TV_ERR_MASK), frame = good;
+  frame.mask = good.image, frame.mask.stride_bytes = 3, expect_refused(TV_ERR_MASK);
   frame.mask = good.image, frame.mask.data = (const uint8_t *)&state;
   expect_refused(TV_ERR_OVERLAP), frame = good;
 }
@@ -802,6 +802,39 @@ static void test_no_keypoint_is_taken_where_the_mask_is_0(void) {
   TEST_ASSERT_TRUE(state.has_pose);
 }
 
+static void test_a_located_frame_has_no_keypoint_where_the_mask_is_0(void) {
+  tv_image image, mask;
+  tv_odometry_state found, masked;
+  fly(odometry, 5);
+  save(odometry, map, &num_map);
+  image = frame.image;
+  room_flight(num_flown - 4, pixels);
+  tv_odometry_state_init(&found);
+  tv_odometry_state_init(&masked);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_locate(odometry, &image, -1, &found));
+  TEST_ASSERT_TRUE(found.has_pose);
+  make_mask(ROOM_WIDTH, &mask);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_locate_masked(odometry, &image, &mask, -1, &masked));
+  TEST_ASSERT_EQUAL_MEMORY(&found, &masked, sizeof found);
+  mask.data = NULL, mask.width = 1; /* not read */
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_locate_masked(odometry, &image, &mask, -1, &masked));
+  TEST_ASSERT_EQUAL_MEMORY(&found, &masked, sizeof found);
+  make_mask(2 * ROOM_WIDTH / 3, &mask);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_locate_masked(odometry, &image, &mask, -1, &masked));
+  TEST_ASSERT_TRUE(masked.has_pose);
+  TEST_ASSERT_LESS_THAN_INT(found.num_inliers, masked.num_inliers);
+  make_mask(0, &mask);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_locate_masked(odometry, &image, &mask, -1, &masked));
+  TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_LOST, masked.status);
+  expect_unchanged();
+  mask.width -= 1;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_MASK,
+                        tv_odometry_locate_masked(odometry, &image, &mask, -1, &masked));
+  mask = image, mask.data = (const uint8_t *)&masked;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
+                        tv_odometry_locate_masked(odometry, &image, &mask, -1, &masked));
+}
+
 static void test_a_mask_without_0_and_the_frame_of_an_older_header_change_nothing(void) {
   size_t num;
   fly(odometry, 4);
@@ -1316,6 +1349,7 @@ int main(void) {
   RUN_TEST(test_frames_go_on_as_if_none_had_been_located);
   RUN_TEST(test_the_camera_is_reported);
   RUN_TEST(test_no_keypoint_is_taken_where_the_mask_is_0);
+  RUN_TEST(test_a_located_frame_has_no_keypoint_where_the_mask_is_0);
   RUN_TEST(test_a_mask_without_0_and_the_frame_of_an_older_header_change_nothing);
   RUN_TEST(test_what_stands_still_is_reported_as_a_mask);
   RUN_TEST(test_the_clock_is_read);

@@ -248,9 +248,10 @@ TV_API tv_status tv_odometry_reset(tv_odometry *odometry);
    in status.
    Each status names one argument: TV_ERR_NULL (a pointer, or that of the image's pixels),
    TV_ERR_STRUCT_SIZE, TV_ERR_CAMERA (the image is not of the camera's size), TV_ERR_STRIDE (the
-   image's), TV_ERR_NOT_FINITE (the time), TV_ERR_ARGUMENT (gap is neither 0 nor 1), TV_ERR_TIME
-   (gap is 0, and the time is not later than that of the frame before), TV_ERR_OVERLAP (the state is
-   written over the frame or its pixels). With each of these the odometry is as before.
+   image's), TV_ERR_MASK (the mask is not of the image's size), TV_ERR_NOT_FINITE (the time),
+   TV_ERR_ARGUMENT (gap is neither 0 nor 1), TV_ERR_TIME (gap is 0, and the time is not later than
+   that of the frame before), TV_ERR_OVERLAP (the state is written over the frame or its pixels).
+   With each of these the odometry is as before.
    Time: bounded by the options. Memory: the odometry's own. Equal frames give equal bytes on every
    CPU. */
 TV_API tv_status tv_odometry_track(tv_odometry *odometry, const tv_odometry_frame *frame,
@@ -285,6 +286,12 @@ TV_API tv_status tv_odometry_finish(tv_odometry *odometry);
    Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_CAMERA, TV_ERR_STRIDE, TV_ERR_OVERLAP. */
 TV_API tv_status tv_odometry_locate(tv_odometry *odometry, const tv_image *image, int32_t near_id,
                                     tv_odometry_state *state);
+
+/* As tv_odometry_locate, of a frame that a mask leaves parts of out.
+   mask: null, or as tv_odometry_frame.mask. Returns TV_ERR_MASK, too. */
+TV_API tv_status tv_odometry_locate_masked(tv_odometry *odometry, const tv_image *image,
+                                           const tv_image *mask, int32_t near_id,
+                                           tv_odometry_state *state);
 
 /* Writes the pose world_from_cam of a frame in the last state of the map, from what
    tv_odometry_state said of the frame when it was tracked: reference_id, reference_from_cam_R and

@@ -80,7 +80,10 @@ typedef enum tv_status {
   TV_ERR_TIME = 14,
   /* The stride of a frame's image is below its width, or so large that its rows have no addresses
      (tv_odometry_track, tv_odometry_locate). */
-  TV_ERR_STRIDE = 15
+  TV_ERR_STRIDE = 15,
+  /* The mask of a frame is not of its image's size, or its stride does not fit its width
+     (tv_odometry_track, tv_odometry_locate_masked). */
+  TV_ERR_MASK = 16
 } tv_status;
 
 /* Returns a short English phrase for a status, or "unknown status" for any other number. The string

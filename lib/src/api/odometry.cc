@@ -125,12 +125,19 @@ tv_status check_frame_image(const tv_odometry& odometry, const tv_image& image) 
   return status == TV_ERR_ARGUMENT ? TV_ERR_STRIDE : status;
 }
 
+// mask: null, or with pixels.
+tv_status check_frame_mask(const tv_image* mask, const tv_image& image) {
+  const tv_status status = check_mask(mask, image);
+  return status == TV_ERR_ARGUMENT ? TV_ERR_MASK : status;
+}
+
 // Whether a state that is written overlaps what is read.
 bool overlaps(const tv_odometry_state* state, const void* input, size_t input_bytes,
-              const tv_image& image) {
+              const tv_image& image, const tv_image* mask) {
   const size_t bytes = state->struct_size;
   return overlap(state, bytes, input, input_bytes) ||
-         overlap(state, bytes, image.data, image_bytes(image));
+         overlap(state, bytes, image.data, image_bytes(image)) ||
+         (mask != nullptr && overlap(state, bytes, mask->data, image_bytes(*mask)));
 }
 
 }  // namespace
@@ -273,18 +280,14 @@ tv_status tv_odometry_track(tv_odometry* odometry, const tv_odometry_frame* fram
   if (status == TV_OK) status = tv::check_sized(state);
   if (status == TV_OK) status = tv::check_frame_image(*odometry, input.image);
   if (status != TV_OK) return status;
-  const bool has_mask = input.mask.data != nullptr;
-  if (has_mask) status = tv::check_mask(&input.mask, input.image);
+  const tv_image* mask = input.mask.data != nullptr ? &input.mask : nullptr;
+  status = tv::check_frame_mask(mask, input.image);
   if (status != TV_OK) return status;
   if (!tv::is_finite(input.time_s)) return TV_ERR_NOT_FINITE;
   if (!tv::within(input.gap, 0, 1)) return TV_ERR_ARGUMENT;
   if (odometry->num_frames > 0 && input.gap == 0 && !(input.time_s > odometry->last_time_s))
     return TV_ERR_TIME;
-  if (tv::overlaps(state, frame, frame->struct_size, input.image) ||
-      (has_mask &&
-       tv::overlap(state, state->struct_size, input.mask.data, tv::image_bytes(input.mask)))) {
-    return TV_ERR_OVERLAP;
-  }
+  if (tv::overlaps(state, frame, frame->struct_size, input.image, mask)) return TV_ERR_OVERLAP;
   tv_odometry_state packed{};
   tv::track_frame(odometry, input, &packed);
   tv::write_sized(packed, state);
@@ -315,13 +318,21 @@ tv_status tv_odometry_finish(tv_odometry* odometry) {
 
 tv_status tv_odometry_locate(tv_odometry* odometry, const tv_image* image, int32_t near_id,
                              tv_odometry_state* state) {
+  return tv_odometry_locate_masked(odometry, image, nullptr, near_id, state);
+}
+
+tv_status tv_odometry_locate_masked(tv_odometry* odometry, const tv_image* image,
+                                    const tv_image* mask, int32_t near_id,
+                                    tv_odometry_state* state) {
   if (odometry == nullptr || image == nullptr || state == nullptr) return TV_ERR_NULL;
+  if (mask != nullptr && mask->data == nullptr) mask = nullptr;
   tv_status status = tv::check_sized(state);
   if (status == TV_OK) status = tv::check_frame_image(*odometry, *image);
+  if (status == TV_OK) status = tv::check_frame_mask(mask, *image);
   if (status != TV_OK) return status;
-  if (tv::overlaps(state, image, sizeof *image, *image)) return TV_ERR_OVERLAP;
+  if (tv::overlaps(state, image, sizeof *image, *image, mask)) return TV_ERR_OVERLAP;
   tv_odometry_state packed{};
-  tv::locate_frame(odometry, *image, near_id, &packed);
+  tv::locate_frame(odometry, *image, mask, near_id, &packed);
   tv::write_sized(packed, state);
   return TV_OK;
 }

@@ -24,6 +24,7 @@ const char *tv_status_string(tv_status status) {
     case TV_ERR_MAP: return "the bytes are no map of this version";
     case TV_ERR_TIME: return "the time is not later than that of the frame before";
     case TV_ERR_STRIDE: return "the image's stride does not fit its width";
+    case TV_ERR_MASK: return "the mask is not of its image's size";
     default: return "unknown status";
   }
 }

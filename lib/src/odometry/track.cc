@@ -545,11 +545,11 @@ void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry
   odometry->last_time_s = input.time_s;
 }
 
-void locate_frame(Odometry* odometry, const tv_image& image, int32_t near_id,
+void locate_frame(Odometry* odometry, const tv_image& image, const tv_image* mask, int32_t near_id,
                   tv_odometry_state* state) {
   const int32_t reference = odometry->reference_id;
   Frame* frame = &odometry->previous;  // has no other use until the next frame comes
-  extract_frame(odometry, image, nullptr, frame);
+  extract_frame(odometry, image, mask, frame);
   PoseFit fit;
   clear_state(*frame, state);
   write_counts(*odometry, state);

@@ -15,7 +15,8 @@ bool finish_keyframe(Odometry* odometry, Frame* frame);
 // Does the work that was left for the frames to come.
 void finish_map(Odometry* odometry);
 
-void locate_frame(Odometry* odometry, const tv_image& image, int32_t near_id,
+// mask: null, or of the image's size.
+void locate_frame(Odometry* odometry, const tv_image& image, const tv_image* mask, int32_t near_id,
                   tv_odometry_state* state);
 
 }  // namespace tv
