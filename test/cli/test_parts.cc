@@ -20,6 +20,7 @@
 #include "pictures/canvas.h"
 #include "report/report.h"
 #include "report/tables.h"
+#include "sources/stream_clock.h"
 
 // unity.h comes after all other headers: it defines isnan and isinf as macros.
 #include "unity.h"
@@ -606,10 +607,39 @@ void test_the_font_gets_letters_that_it_has() {
   TEST_ASSERT_TRUE(plain_is("\xe9\xa3", "__"));
 }
 
+// The times of a stream; -1 for a picture that is left out.
+bool clock_gives(std::initializer_list<double> clock, std::initializer_list<double> expected,
+                 int num_anew) {
+  StreamClock stream;
+  bool equal = true;
+  auto next = expected.begin();
+  for (const double time : clock)
+    equal = equal && std::abs(stream.next(time).value_or(-1) - *next++) < 1e-12;
+  return equal && stream.num_begun_anew() == num_anew && stream.note("it").empty() == !num_anew;
+}
+
+void test_a_clock_that_falls_and_rises_again_began_anew() {
+  TEST_ASSERT_TRUE(clock_gives({5, 6, 7}, {5, 6, 7}, 0));
+  // Twice there; out of order; one wrong stamp.
+  TEST_ASSERT_TRUE(clock_gives({5, 5, 6, 6, 7}, {5, -1, 6, -1, 7}, 0));
+  TEST_ASSERT_TRUE(clock_gives({5, 5.3, 5.1, 5.2, 5.4}, {5, 5.3, -1, -1, 5.4}, 0));
+  TEST_ASSERT_TRUE(clock_gives({5, 6, 0, 7}, {5, 6, -1, 7}, 0));
+  TEST_ASSERT_TRUE(clock_gives({5, 6, 0, 0, 7}, {5, 6, -1, -1, 7}, 0));
+  TEST_ASSERT_TRUE(
+      clock_gives({5, 6, 5.6, 5.7, 5.8, 5.7, 5.8, 6.1}, {5, 6, -1, -1, -1, -1, -1, 6.1}, 0));
+  // By less than a second.
+  TEST_ASSERT_TRUE(
+      clock_gives({5, 6, 5.5, 5.6, 5.7, 5.8, 5.9, 6, 6.1}, {5, 6, -1, -1, -1, -1, 7, 7.1, 7.2}, 1));
+  // Begun anew, once and twice: each goes on a second after what was before.
+  TEST_ASSERT_TRUE(clock_gives({5, 6, 0, 0.5, 1}, {5, 6, -1, 7, 7.5}, 1));
+  TEST_ASSERT_TRUE(clock_gives({5, 6, 0, 2, 4, 1, 2, 9}, {5, 6, -1, 7, 9, -1, 10, 17}, 2));
+}
+
 }  // namespace
 
 int main() {
   UNITY_BEGIN();
+  RUN_TEST(test_a_clock_that_falls_and_rises_again_began_anew);
   RUN_TEST(test_auc_is_the_area_under_straight_lines_of_recall);
   RUN_TEST(test_percentile_lies_between_its_neighbours);
   RUN_TEST(test_a_distance_has_the_sigma_that_the_pose_gives_it);

@@ -9,6 +9,7 @@
 #include "recording/playback.h"
 #include "recording/recording_input.h"
 #include "recording/recording_pair.h"
+#include "sources/stream_clock.h"
 
 namespace cli {
 namespace {
@@ -33,7 +34,9 @@ CameraMount mount_in(const std::string& camera_file) {
   return camera_file.empty() ? CameraMount{} : load_mount(camera_file);
 }
 
-// Turns the driver's frames into those of a source, and drops those whose time does not rise.
+double host_s(const tvs_frame& picture) { return static_cast<double>(picture.time.host_ns) * 1e-9; }
+
+// Turns the driver's frames into those of a source, with times that rise.
 class Frames {
  public:
   Frames(const FrameSource::Wanted& wanted, const FrameSource::Consumer& consume,
@@ -44,14 +47,12 @@ class Frames {
   std::optional<SourceFrame> next(const tvs_frame& frame) {
     SourceFrame result;
     result.index = index_++;
-    result.time_s = static_cast<double>(frame.time.host_ns) * 1e-9;
     gap_ = gap_ || (frame.flags & (TVS_FRAME_GAP | TVS_FRAME_NEW_STREAM)) != 0;
-    if (done || !(result.time_s > last_time_s_)) {
-      gap_ = true;
-      return {};
-    }
-    last_time_s_ = result.time_s;
-    if (!wanted_(result.index)) return {};
+    if (done) return {};
+    const std::optional<double> time_s = clock_.next(host_s(frame));
+    gap_ = gap_ || !time_s || clock_.began_anew();
+    if (!time_s || !wanted_(result.index)) return {};
+    result.time_s = *time_s;
     char name[40];
     std::snprintf(name, sizeof name, "frame_%06llu.png",
                   static_cast<unsigned long long>(frame.number));
@@ -62,6 +63,16 @@ class Frames {
                           const_cast<uint8_t*>(frame.image.data),
                           static_cast<size_t>(frame.image.stride_bytes));
     return result;
+  }
+  int num() const { return index_; }
+  // What the user must know of the clock.
+  std::vector<std::string> notes() const {
+    std::vector<std::string> notes;
+    if (const int64_t count = clock_.num_left_out(); count > 0)
+      notes.push_back(std::to_string(count) + (count == 1 ? " frame is" : " frames are") +
+                      " left out: no later than the one before");
+    if (const std::string note = clock_.note("the stream"); !note.empty()) notes.push_back(note);
+    return notes;
   }
   // An exception must not pass through the driver's C code, so it is stored.
   void consume(const SourceFrame& frame) {
@@ -85,11 +96,30 @@ class Frames {
   const FrameSource::Consumer& consume_;
   const std::atomic<bool>& stop_;
   int index_ = 0;
-  double last_time_s_ = -INFINITY;
+  StreamClock clock_;
   bool gap_ = false;
 };
 
-class RecordingFrames : public FrameSource {
+// A source whose frames a driver gives.
+class DriverSource : public FrameSource {
+ public:
+  std::vector<std::string> notes() const override { return notes_; }
+
+ protected:
+  // At the end of a run. A second run may have ended sooner.
+  void end(const Frames& frames) {
+    frames.rethrow();
+    if (frames.num() < num_frames_) return;
+    num_frames_ = frames.num();
+    notes_ = frames.notes();
+  }
+
+ private:
+  int num_frames_ = 0;
+  std::vector<std::string> notes_;
+};
+
+class RecordingFrames : public DriverSource {
  public:
   RecordingFrames(const std::string& folder, const std::string& camera_file)
       : folder_(folder), mount_(mount_in(camera_file)), flight_(read_flight(folder)) {}
@@ -102,12 +132,12 @@ class RecordingFrames : public FrameSource {
       if (!frame) return;
       const size_t idx = static_cast<size_t>(frame->index);
       if (idx < flight_.frames.size() && flight_.frames[idx].timed)
-        if (const auto at = sample_at(flight_.log, frame->time_s, kGapS))
+        if (const auto at = sample_at(flight_.log, host_s(picture), kGapS))
           add_measurements(*at, mount_, *frame);
       frames.consume(*frame);
     };
     play(folder_, listener, frames.done, 0);
-    frames.rethrow();
+    end(frames);
   }
   bool can_run_again() const override { return true; }
   int num_frames() const override { return static_cast<int>(flight_.frames.size()); }
@@ -131,7 +161,7 @@ class RecordingFrames : public FrameSource {
   RecordedFlight flight_;
 };
 
-class DroneFrames : public FrameSource {
+class DroneFrames : public DriverSource {
  public:
   DroneFrames(const DroneAddress& address, double seconds, const std::string& camera_file)
       : address_(address), seconds_(seconds), mount_(mount_in(camera_file)) {}
@@ -147,7 +177,7 @@ class DroneFrames : public FrameSource {
       std::optional<SourceFrame> frame = frames.next(picture);
       if (!frame) return;
       // What comes after the frame is not known yet: the newest sample is taken.
-      if (latest && std::abs(latest->time_s - frame->time_s) <= kGapS)
+      if (latest && std::abs(latest->time_s - host_s(picture)) <= kGapS)
         add_measurements(*latest, mount_, *frame);
       frames.consume(*frame);
     };
@@ -158,7 +188,7 @@ class DroneFrames : public FrameSource {
     options.decoder = decoder.get();
     Link link(address_, options, listener);
     link.run([&] { return frames.done.load(); }, stop, seconds_);
-    frames.rethrow();
+    end(frames);
   }
   bool can_run_again() const override { return false; }
   int num_frames() const override { return -1; }
@@ -170,7 +200,7 @@ class DroneFrames : public FrameSource {
   CameraMount mount_;
 };
 
-class VehicleFrames : public FrameSource {
+class VehicleFrames : public DriverSource {
  public:
   VehicleFrames(const VehicleAddress& vehicle, double seconds, const std::string& camera_file,
                 bool quiet)
@@ -187,13 +217,13 @@ class VehicleFrames : public FrameSource {
     listener.on_frame = [&](const tvs_frame& picture) {
       std::optional<SourceFrame> frame = frames.next(picture);
       if (!frame) return;
-      if (const auto at = sample_at(log, frame->time_s, kGapS))
+      if (const auto at = sample_at(log, host_s(picture), kGapS))
         add_measurements(*at, mount_, *frame);
       frames.consume(*frame);
     };
     fly_vehicle(
         vehicle_, listener, [&] { return frames.done.load(); }, stop, seconds_, quiet_);
-    frames.rethrow();
+    end(frames);
   }
   bool can_run_again() const override { return false; }
   int num_frames() const override { return -1; }

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <opencv2/videoio.hpp>
+#include <utility>
 
 #include "base/error.h"
 #include "base/silence.h"
@@ -40,11 +41,13 @@ class FilmSource : public FrameSource {
 
   void run(const Wanted& wanted, const Consumer& consume, const std::atomic<bool>& stop) override {
     Film film(file_, fps_);
-    bool goes_on = true;
+    bool goes_on = true, gap = false;
     while (goes_on && !stop && film.next()) {
       SourceFrame frame;
       frame.index = static_cast<int>(film.index());
+      gap = gap || film.began_anew();
       if (!wanted(frame.index)) continue;
+      frame.gap = std::exchange(gap, false);
       char name[40];
       std::snprintf(name, sizeof name, "frame_%06d.png", frame.index);
       frame.name = name;

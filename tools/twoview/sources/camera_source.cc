@@ -58,6 +58,7 @@ struct Silence {
 struct Shot {
   cv::Mat luma;
   uint64_t number = 0;
+  bool began_anew = false;  // its stream's clock
   tvs_time time{};
 };
 
@@ -104,6 +105,7 @@ bool CameraSource::State::take(Shot& shot) {
   }
   if (shot.luma.depth() != CV_8U) return false;
   shot.number = num_taken++;
+  shot.began_anew = film_file && film_file->began_anew();
   shot.time = tvs_time{};
   if (kind == Kind::kLive) {
     shot.time.received_ns = shot.time.host_ns = steady_ns();
@@ -157,8 +159,9 @@ tvs_status CameraSource::State::next(tvs_frame* frame) {
     *shot = std::move(latest);
     has_latest = false;
   }
-  frame->flags = TVS_FRAME_KEY | (shot->number != next_number ? TVS_FRAME_GAP : 0) |
-                 (next_number == 0 ? TVS_FRAME_NEW_STREAM : 0);
+  const bool gap = shot->number != next_number || shot->began_anew;
+  frame->flags =
+      TVS_FRAME_KEY | (gap ? TVS_FRAME_GAP : 0) | (next_number == 0 ? TVS_FRAME_NEW_STREAM : 0);
   next_number = shot->number + 1;
   frame->image = {shot->luma.data, shot->luma.cols, shot->luma.rows,
                   static_cast<int64_t>(shot->luma.step)};

@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "sources/film_container.h"
+#include "sources/stream_clock.h"
 
 namespace cli {
 namespace {
@@ -71,7 +72,10 @@ struct Film::State {
   FilmContainer container;
   FilmFacts facts;
   double step_s = 0;  // between two pictures, where the times come from a rate
-  double first_s = 0, time_s = 0;
+  StreamClock clock;
+  double first_s = 0;  // the container's time of the first picture
+  double clock_s = 0;  // of the picture before, since then
+  double time_s = 0;
   int64_t index = -1, num_pictures = 0;
   std::vector<double> times;  // of the container, where OpenCV does not say a picture's
 
@@ -83,6 +87,7 @@ struct Film::State {
   }
   double next_container_time();
   void add_interval(double interval_s);
+  double mean_interval_s() const;
   void end();
 };
 
@@ -90,22 +95,29 @@ struct Film::State {
 // file, which are as many as it has threads: their times are the container's next ones.
 double Film::State::next_container_time() {
   if (times.empty()) times = picture_times(path);
-  const double last = time_s + first_s;
+  const double last = clock_s + first_s;
   const auto next = std::find_if(times.begin(), times.end(),
                                  [&](double time) { return time > last + kClockUnit_s; });
   return next == times.end() ? last : *next;
 }
 
 void Film::State::add_interval(double interval_s) {
-  const bool is_first = num_pictures == 1;
+  const bool is_first = !(facts.shortest_s > 0);
   facts.shortest_s = is_first ? interval_s : std::min(facts.shortest_s, interval_s);
   facts.longest_s = is_first ? interval_s : std::max(facts.longest_s, interval_s);
   facts.is_variable =
       facts.longest_s - facts.shortest_s > std::max(kRounding_s, kSteadyShare * facts.shortest_s);
 }
 
+// Without the pauses in which the clock began anew.
+double Film::State::mean_interval_s() const {
+  const int64_t num_anew = clock.num_begun_anew(), num = num_pictures - 1 - num_anew;
+  const double seconds = time_s - static_cast<double>(num_anew) * StreamClock::kPause_s;
+  return num > 0 ? seconds / static_cast<double>(num) : 0;
+}
+
 void Film::State::end() {
-  const double interval_s = num_pictures > 1 ? time_s / static_cast<double>(num_pictures - 1) : 0;
+  const double interval_s = mean_interval_s();
   if (facts.times == FilmFacts::Times::kContainer && container.duration_s > 0)
     facts.missing_s = std::max(0.0, container.duration_s - time_s - interval_s);
 }
@@ -146,16 +158,18 @@ bool Film::next() {
   State& s = *state_;
   while (s.capture.grab()) {
     ++s.index;
-    const double time_s = s.time_of_picture();
-    if (s.num_pictures > 0 && !(time_s > s.time_s)) {
-      ++s.facts.num_left_out;
-      continue;
-    }
-    if (s.num_pictures > 0) s.add_interval(time_s - s.time_s);
-    s.time_s = time_s;
+    const double clock_s = s.time_of_picture();
+    const std::optional<double> time_s = s.clock.next(clock_s);
+    s.clock_s = clock_s;
+    s.facts.num_left_out = s.clock.num_left_out();
+    if (!time_s) continue;
+    s.facts.num_begun_anew = s.clock.num_begun_anew();
+    if (s.num_pictures > 0 && !s.clock.began_anew()) s.add_interval(*time_s - s.time_s);
+    s.time_s = *time_s;
     ++s.num_pictures;
-    if (s.facts.times == FilmFacts::Times::kContainer && s.num_pictures > 1)
-      s.facts.rate_hz = static_cast<double>(s.num_pictures - 1) / time_s;
+    if (const double interval_s = s.mean_interval_s();
+        s.facts.times == FilmFacts::Times::kContainer && interval_s > 0)
+      s.facts.rate_hz = 1 / interval_s;
     return true;
   }
   s.end();
@@ -164,6 +178,7 @@ bool Film::next() {
 
 int64_t Film::index() const { return state_->index; }
 double Film::time_s() const { return state_->time_s; }
+bool Film::began_anew() const { return state_->clock.began_anew(); }
 
 cv::Mat Film::picture() {
   cv::Mat picture;
@@ -174,8 +189,6 @@ cv::Mat Film::picture() {
   }
   return picture;
 }
-
-cv::Mat Film::luma() { return luma_of(picture()); }
 
 const FilmFacts& Film::facts() const { return state_->facts; }
 
@@ -200,6 +213,7 @@ std::vector<std::string> Film::notes() const {
         std::to_string(f.num_left_out) +
         (f.num_left_out == 1 ? " picture of the film is" : " pictures of the film are") +
         " left out: no later than the one before, by the container's times");
+  if (const std::string note = s.clock.note("the film"); !note.empty()) notes.push_back(note);
   if (f.clock_start_s > 1e-3 && f.times == FilmFacts::Times::kContainer)
     notes.push_back("the film's clock begins at " + text_of("%.6g", f.clock_start_s) +
                     " s; times here count from its first picture");

@@ -21,12 +21,13 @@ struct FilmFacts {
   double rate_hz = 0;         // pictures a second, their mean where the rate varies
   bool is_variable = false;   // the times between pictures differ by more than their rounding
   double longest_s = 0, shortest_s = 0;  // time between two pictures
-  double clock_start_s = 0;  // the container's time of the first picture, which is time 0 here
-  int turn_deg = 0;          // by how much a player turns the pictures clockwise: 0, 90, 180, 270
-  bool is_mirrored = false;  // a player mirrors them, before it turns them
-  double pixel_aspect = 1;   // the width of a pixel over its height
-  int64_t num_left_out = 0;  // pictures whose time is not later than that of the one before
-  double missing_s = 0;      // how much longer the film is by its header than by its pictures
+  double clock_start_s = 0;    // the container's time of the first picture, which is time 0 here
+  int turn_deg = 0;            // by how much a player turns the pictures clockwise: 0, 90, 180, 270
+  bool is_mirrored = false;    // a player mirrors them, before it turns them
+  double pixel_aspect = 1;     // the width of a pixel over its height
+  int64_t num_left_out = 0;    // pictures whose time is not later than that of the one before
+  int64_t num_begun_anew = 0;  // how often the clock began anew, as where two films are one file
+  double missing_s = 0;        // how much longer the film is by its header than by its pictures
 };
 const char* times_name(FilmFacts::Times times);
 
@@ -42,15 +43,15 @@ class Film {
   Film& operator=(const Film&) = delete;
 
   // Goes to the next picture, in the order in which they are shown; false at the end. A picture
-  // whose time is not later than that of the one before is left out, and counted.
+  // whose time is not later than that of the one before is left out, and counted, but where the
+  // clock began anew (sources/stream_clock.h).
   bool next();
   // Of the picture that next() went to. The index counts those that were left out, too; the time
   // is in seconds since the first picture; the picture is empty where it does not decode.
   int64_t index() const;
   double time_s() const;
+  bool began_anew() const;  // the clock, before this picture
   cv::Mat picture();
-  // The same as 8-bit grey.
-  cv::Mat luma();
 
   const FilmFacts& facts() const;
   // How many pictures the header promises; 0 where it does not.
