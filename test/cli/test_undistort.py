@@ -152,6 +152,32 @@ class Undistort(cli.CliTest):
                 r = math.hypot(u - CX, v - CY) / (0.2 * F)
                 self.assertTrue(r < 0.83 or image[v * W + u] == 0)
 
+    def test_images_that_cannot_be_used_are_left_out_and_named(self):
+        self.lens_file("brown_conrady")
+        whole = png(W, H, [128] * (W * H))
+        self.write("small.png", png(8, 8, [128] * 64))
+        self.write("cut.png", whole[:len(whole) // 2])
+        self.write("empty.png", b"")
+        self.write("text.png", b"not a picture at all")
+        for name in "a.png", "b.png":
+            self.write(name, whole)
+        images = ("small.png", "a.png", "cut.png", "empty.png", "b.png", "text.png")
+        self.assert_refused(self.undistort(images=("cut.png", "text.png")), "cut.png")
+        options = (("--camera", "lens.yaml"), ("--camera", "lens.yaml", "--scale-camera"),
+                   ("--focal-35mm", "30"))
+        for given in options:
+            with self.subTest(options=given):
+                done = self.run_program("undistort", *images, *given, "-o", self.out, "--json")
+                result = json.loads(self.succeed(done).stdout)
+                self.assertEqual(result["images"], ["a.png", "b.png"])
+                self.assertEqual([row["image"] for row in result["left_out"]],
+                                 ["small.png", "cut.png", "empty.png", "text.png"])
+                self.assertIn("8x8", result["left_out"][0]["reason"])
+                self.assertEqual(self.listing(), ["a.png", "b.png", "camera.yaml"])
+        done = self.succeed(self.undistort(images=images))
+        self.assertIn("4 images are left out: ", done.stdout.decode())
+        self.assertIn("cut.png", done.stdout.decode())
+
     def test_bad_input_is_refused_and_nothing_written(self):
         self.lens_file("brown_conrady")
         self.write("d.png", png(W, H, [128] * (W * H)))
@@ -159,9 +185,7 @@ class Undistort(cli.CliTest):
         (self.folder / "x").mkdir()
         self.write("x/d.png", png(W, H, [1] * (W * H)))
         self.assert_refused(self.undistort(images=("d.png", "none.png")), "none.png")
-        self.assert_refused(
-            self.undistort(images=("d.png", "small.png")), "small.png", "8x8", f"{W}x{H}"
-        )
+        self.assert_refused(self.undistort(images=("small.png",)), "small.png", "8x8", f"{W}x{H}")
         self.assert_refused(self.undistort(images=("d.png", "x/d.png")), "two results", "d.png")
         self.assert_refused(self.undistort("--mask", images=("mask.jpg",)), "mask.png")
         self.assert_refused(self.undistort(camera="none.yaml"), "none.yaml")

@@ -191,7 +191,8 @@ Picture load_picture(const std::string& path) {
     cv::cvtColor(pixels, opaque, cv::COLOR_BGRA2BGR);
     pixels = opaque;
   }
-  if (pixels.depth() == CV_16U) {
+  picture.is_16bit = pixels.depth() == CV_16U;
+  if (picture.is_16bit) {
     const int64_t said = read_image_header(bytes).max_sample;
     pixels = reduced(pixels, said > 255 && said < 65535 ? said : 65535, picture.is_stretched);
   }
@@ -278,8 +279,8 @@ std::string png_bytes(const cv::Mat& picture) {
   return encoded(picture, ".png", {cv::IMWRITE_PNG_COMPRESSION, 4});
 }
 
-std::string jpeg_bytes(const cv::Mat& picture) {
-  return encoded(picture, ".jpg", {cv::IMWRITE_JPEG_QUALITY, 88});
+std::string jpeg_bytes(const cv::Mat& picture, int quality) {
+  return encoded(picture, ".jpg", {cv::IMWRITE_JPEG_QUALITY, quality});
 }
 
 }  // namespace cli

@@ -22,6 +22,7 @@ struct Picture {
   int file_width = 0, file_height = 0;  // pixels, before resizing
   ExifFocal exif;
   int turn_deg = 0;           // how far a viewer turns it clockwise, which is not done here
+  bool is_16bit = false;      // in its file
   bool is_stretched = false;  // 16-bit samples that use less than half of their range
 
   tv_image view() const;
@@ -77,6 +78,6 @@ cv::Mat load_depth(const std::string& path);
 // Encode an 8-bit BGR picture. Use JPEG, which is about ten times smaller than PNG, only for
 // photographs that are shown to people.
 std::string png_bytes(const cv::Mat& picture);
-std::string jpeg_bytes(const cv::Mat& picture);
+std::string jpeg_bytes(const cv::Mat& picture, int quality = 88);
 
 }  // namespace cli

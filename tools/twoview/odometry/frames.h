@@ -24,6 +24,7 @@ struct SourceFrame {
   double time_s = 0;
   cv::Mat luma;                           // 8-bit; empty where the frame cannot be read
   cv::Mat colour;                         // 8-bit BGR, where the source has colours
+  std::string file;                       // which holds just these pixels; empty: none does
   std::string problem;                    // why luma is empty
   ExifFocal exif;                         // of a photograph
   bool gap = false;                       // frames were lost before this one

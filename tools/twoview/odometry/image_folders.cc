@@ -67,11 +67,13 @@ class ImageFolder : public FrameSource {
       frame.time_s = listed.time_s;
       try {
         if (!listed.problem.empty()) throw BadInput(listed.problem);
-        Picture picture = load_picture((fs::path(folder_.path) / listed.name).string());
+        const std::string file = (fs::path(folder_.path) / listed.name).string();
+        Picture picture = load_picture(file);
         if (picture.turn_deg != 0) turn_deg_ = picture.turn_deg;
         if (is_turned_) turn(picture, -picture.turn_deg / 90);
         frame.luma = picture.luma;
         frame.colour = picture.colour;
+        if (picture.turn_deg == 0 && !picture.is_16bit) frame.file = file;
         frame.exif = picture.exif;
         has_stretched_ = has_stretched_ || picture.is_stretched;
       } catch (const BadInput& e) {

@@ -14,6 +14,7 @@
 #include "files/camera_file.h"
 #include "files/camera_formats.h"
 #include "files/image_file.h"
+#include "odometry/colmap_folder.h"
 #include "odometry/film_lens.h"
 #include "odometry/flight.h"
 #include "odometry/live.h"
@@ -57,7 +58,6 @@ std::vector<std::string> own_files() {
   return names;
 }
 const std::vector<std::string> kAlwaysFiles = {"frames.csv", "live.txt", "result.json"};
-const std::vector<std::string> kColmapFiles = {"cameras.txt", "images.txt", "points3D.txt"};
 
 struct Arguments {
   Common common;
@@ -65,6 +65,7 @@ struct Arguments {
   double fps = 0, duration = 0;
   bool ignores_imu = false;
   bool keeps_camera = false;
+  bool leaves_pictures = false;
   bool is_live = false;
   bool has_resize = false;  // --resize is given, if only as 0
   int32_t live_port = 0;
@@ -196,6 +197,7 @@ nlohmann::ordered_json options_of(const Arguments& a, const std::string& truth_f
                                  {"every", a.flight.every},
                                  {"fps", a.fps}};
   json["resize"] = a.flight.resize;
+  json["no_pictures"] = a.leaves_pictures;
   json["mask"] = mask_json(a.flight.masks);
   json["no_imu"] = a.ignores_imu;
   json["kernels"] = tv_kernels_string(static_cast<tv_kernels>(o.kernels));
@@ -213,11 +215,11 @@ nlohmann::ordered_json options_of(const Arguments& a, const std::string& truth_f
 
 nlohmann::ordered_json film_json(const std::optional<FilmFacts>& film) {
   if (!film) return nullptr;
-  return {{"times", times_name(film->times)},   {"rate_hz", film->rate_hz},
-          {"variable_rate", film->is_variable}, {"clock_start_s", film->clock_start_s},
-          {"num_left_out", film->num_left_out}, {"size", {film->width, film->height}},
-          {"rotation_deg", film->turn_deg},     {"mirrored", film->is_mirrored},
-          {"pixel_aspect", film->pixel_aspect}};
+  return {{"times", times_name(film->times)},    {"rate_hz", film->rate_hz},
+          {"variable_rate", film->is_variable},  {"clock_start_s", film->clock_start_s},
+          {"num_left_out", film->num_left_out},  {"num_begun_anew", film->num_begun_anew},
+          {"size", {film->width, film->height}}, {"rotation_deg", film->turn_deg},
+          {"mirrored", film->is_mirrored},       {"pixel_aspect", film->pixel_aspect}};
 }
 
 // The camera that was estimated, as a file for the next flight. One that is doubtful is not
@@ -299,13 +301,6 @@ void make_files(const FlightResult& result, const std::optional<FilmLens>& lens,
   files.add("map.twm", flight.map_bytes());
 }
 
-void make_colmap_files(const FlightResult& result, OutputSet& files) {
-  const ColmapModel model = colmap_model(result);
-  files.add("cameras.txt", model.cameras);
-  files.add("images.txt", model.images);
-  files.add("points3D.txt", model.points);
-}
-
 std::string truth_line(const nlohmann::ordered_json& truth) {
   if (!truth["ate_rmse"].is_number())
     return summary_line("truth", "%s",
@@ -346,7 +341,7 @@ std::string still_note(const FlightResult& result) {
 }
 
 std::string summary(const FlightResult& result, const std::optional<FilmLens>& lens,
-                    const FrameSource& source, const OutputSet& files, bool has_colmap,
+                    const FrameSource& source, const OutputSet& files, const std::string& colmap,
                     const std::string& notes, const std::string& room) {
   const nlohmann::ordered_json& j = result.json;
   std::string text =
@@ -406,8 +401,21 @@ std::string summary(const FlightResult& result, const std::optional<FilmLens>& l
   text += room;
   std::string names;
   for (const std::string& name : files.names()) names += " " + name;
-  return text + summary_line("files", "%s:%s%s", files.folder().c_str(), names.c_str(),
-                             has_colmap ? " colmap/" : "");
+  return text +
+         summary_line("files", "%s:%s%s", files.folder().c_str(), names.c_str(), colmap.c_str());
+}
+
+std::string colmap_words(const ColmapFolder& colmap) {
+  const std::string pictures = colmap.pictures_words();
+  return " colmap/" + (pictures.empty() ? "" : " (" + pictures + ")");
+}
+
+// Pictures of an earlier run as the source of one that would replace them.
+void refuse_own_pictures(const std::string& source, const fs::path& folder) {
+  std::error_code ignored;
+  if (fs::equivalent(source, folder / "colmap" / "images", ignored))
+    throw BadInput(source +
+                   " is read by this run, which writes its pictures there; give another -o");
 }
 
 // The lens of a film of which neither the command line nor the source says a camera; empty where
@@ -482,8 +490,9 @@ int odometry(Arguments& a) {
   files.keep(camera_path(a.camera));
   files.keep(truth_file);
   std::vector<std::string> names = own_files();
-  for (const std::string& name : kColmapFiles) names.push_back("colmap/" + name);
+  for (const std::string& name : ColmapFolder::file_names()) names.push_back("colmap/" + name);
   files.require_own({"odometry", names, kAlwaysFiles, {}});
+  refuse_own_pictures(a.source, files.folder());
   const int wanted = num_wanted(*source, a.flight);
   FlightOptions options = a.flight;
   const std::optional<FilmLens> lens = lens_of_film(a, *source, stop, &options);
@@ -531,6 +540,14 @@ int odometry(Arguments& a) {
 #else
   const FlightRoom room;
 #endif
+  const bool has_map = !result.keyframes.empty();
+  ColmapFolder colmap(files.folder() / "colmap", {camera_path(a.camera), truth_file}, has_map);
+  if (has_map) colmap.add_model(result);
+  if (has_map && !a.leaves_pictures) {
+    const Stopwatch watch(!common.quiet, "writing the pictures of the keyframes");
+    for (const std::string& note : colmap.add_pictures(result, *source, stop)) common.note(note);
+  }
+  result.json["colmap_pictures"] = colmap.pictures_json();
   result.json["focal_length"] = lens ? lens->json() : nlohmann::ordered_json(nullptr);
   result.json["film"] = film_json(film);
   result.json["notes"] = common.notes;
@@ -542,28 +559,17 @@ int odometry(Arguments& a) {
   result.json["kernels"] = session.kernels();
   const std::string name = fs::absolute(fs::path(a.source) / "x").parent_path().filename().string();
   make_files(result, lens, a.source.empty() ? source->kind() : name, room, files);
-  const bool has_map = !result.keyframes.empty();
-  const fs::path colmap_folder = files.folder() / "colmap";
-  std::optional<OutputSet> colmap;  // without a map, to remove an earlier run's files
-  if (has_map || fs::is_directory(colmap_folder)) {
-    colmap.emplace(colmap_folder);
-    colmap->keep(camera_path(a.camera));
-    if (has_map) make_colmap_files(result, *colmap);
-  }
   if (common.json) print(json_text(result.json));
   const std::string notes = common.note_lines();
-  if (common.speaks()) print(summary(result, lens, *source, files, has_map, notes, room.summary));
+  if (common.speaks())
+    print(summary(result, lens, *source, files, has_map ? colmap_words(colmap) : "", notes,
+                  room.summary));
   files.commit();
   files.remove_others(own_files());
 #ifdef TWOVIEW_HAS_ROOM
   if (depth) depth->commit();
 #endif
-  if (colmap) {
-    colmap->commit();
-    colmap->remove_others(kColmapFiles);
-    std::error_code ignored;
-    if (!has_map) fs::remove(colmap_folder, ignored);  // not where something else is in it
-  }
+  colmap.commit();
   return exit_status(flight, result);
 }
 
@@ -607,6 +613,8 @@ void add_odometry(CLI::App& program, Run& run) {
   verb->add_flag(
       "--keep-camera", a->keeps_camera,
       "keep the principal point, also where many keyframes agree that it lies elsewhere");
+  verb->add_flag("--no-pictures", a->leaves_pictures,
+                 "leave the keyframes' pictures out of colmap/, with the models of these");
   add_number(*verb, "seed", &o.seed, 0, kLargestSeed, "of the samplers");
   CLI::Option* resize = add_number(*verb, "resize", &a->flight.resize, 0, kMaxSide,
                                    "scale frames down to this longer side, pixels; 0: as they are");

@@ -162,6 +162,15 @@ std::string colmap_cameras(const tv_camera& c) {
   return text + "\n";
 }
 
+// Moves a pixel of one camera to where the other one, in the same place, has it; false where that
+// is outside its picture.
+bool moved(const tv_camera& from, const tv_camera& to, std::array<double, 2>& pixel) {
+  double ray[3];
+  return tv_camera_unproject(&from, pixel.data(), ray, nullptr) == TV_OK &&
+         tv_camera_project(&to, ray, pixel.data(), nullptr) == TV_OK && pixel[0] >= -0.5 &&
+         pixel[1] >= -0.5 && pixel[0] <= to.width - 0.5 && pixel[1] <= to.height - 0.5;
+}
+
 // The standard deviation of the longest segment's scale, as its last frame that was tracked in it
 // said: the segment that the film ends in may be another one. 0: its unit is not the metre, or the
 // sensors have contradicted each other since.
@@ -181,6 +190,13 @@ Json scale_contradiction(const tv_odometry_state& state) {
 }
 
 }  // namespace
+
+Pose pose_of(const tv_keyframe& keyframe) {
+  Pose pose;
+  std::copy(keyframe.world_from_cam_R, keyframe.world_from_cam_R + 9, pose.R.begin());
+  std::copy(keyframe.world_from_cam_t, keyframe.world_from_cam_t + 3, pose.t.begin());
+  return pose;
+}
 
 Trajectory trajectory_of(const Flight& flight, int32_t segment) {
   Trajectory trajectory;
@@ -299,10 +315,7 @@ std::string keyframes_text(const FlightResult& result) {
       text += "# segment " + std::to_string(key.keyframe.segment) +
               ": its poses do not compare with those of another segment\n";
     segment = key.keyframe.segment;
-    Pose pose;
-    std::copy(key.keyframe.world_from_cam_R, key.keyframe.world_from_cam_R + 9, pose.R.begin());
-    std::copy(key.keyframe.world_from_cam_t, key.keyframe.world_from_cam_t + 3, pose.t.begin());
-    text += tum_line(key.keyframe.time_s, pose);
+    text += tum_line(key.keyframe.time_s, pose_of(key.keyframe));
   }
   return text;
 }
@@ -399,10 +412,10 @@ std::string map_ply(const std::vector<tv_map_point>& points, const std::vector<R
   return bytes;
 }
 
-ColmapModel colmap_model(const FlightResult& result) {
+ColmapModel colmap_model(const FlightResult& result, const ColmapPictures* pictures) {
   const Flight& flight = *result.flight;
   ColmapModel model;
-  model.cameras = colmap_cameras(flight.camera());
+  model.cameras = colmap_cameras(pictures != nullptr ? pictures->camera : flight.camera());
   struct Sighting {
     int32_t image, idx;
   };
@@ -413,22 +426,23 @@ ColmapModel colmap_model(const FlightResult& result) {
   for (const FlightKeyframe& key : result.keyframes) {
     const tv_keyframe& k = key.keyframe;
     if (k.segment != result.segment) continue;
+    if (pictures != nullptr && pictures->names.count(k.id) == 0) continue;
     ++num_images;
-    Pose world_from_cam;
-    std::copy(k.world_from_cam_R, k.world_from_cam_R + 9, world_from_cam.R.begin());
-    std::copy(k.world_from_cam_t, k.world_from_cam_t + 3, world_from_cam.t.begin());
-    const Pose pose = inverse(world_from_cam);
+    const Pose pose = inverse(pose_of(k));
     const std::array<double, 4> q = quaternion_of(pose.R);
     images += std::to_string(k.id + 1);
     for (const double value : {q[3], q[0], q[1], q[2], pose.t[0], pose.t[1], pose.t[2]})
       images += number_text(value);
-    images += " 1 " + flight.given(k.frame).name + "\n";
+    images += " 1 " +
+              (pictures != nullptr ? pictures->names.at(k.id) : flight.given(k.frame).name) + "\n";
     int32_t idx = 0;
     for (const tv_map_observation& seen : key.observations) {
       if (seen.idx_point < 0) continue;
+      std::array<double, 2> place = {static_cast<double>(seen.x), static_cast<double>(seen.y)};
+      if (pictures != nullptr && !moved(flight.camera(), pictures->camera, place)) continue;
       const tv_map_point& point = result.points[static_cast<size_t>(seen.idx_point)];
-      images += number_text(static_cast<double>(seen.x) + 0.5).substr(idx == 0 ? 1 : 0) +
-                number_text(static_cast<double>(seen.y) + 0.5) + " " + std::to_string(point.id + 1);
+      images += number_text(place[0] + 0.5).substr(idx == 0 ? 1 : 0) + number_text(place[1] + 0.5) +
+                " " + std::to_string(point.id + 1);
       tracks[seen.idx_point].push_back({k.id + 1, idx++});
       Vector3 x = applied(pose.R, {point.position[0], point.position[1], point.position[2]});
       for (size_t axis = 0; axis < 3; ++axis) x[axis] += pose.t[axis];

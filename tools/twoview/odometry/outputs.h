@@ -2,6 +2,7 @@
 // result.json.
 #pragma once
 
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -42,6 +43,9 @@ struct FlightResult {
 FlightResult result_of(const Flight& flight, const std::optional<TruePoses>& truth,
                        double film_start_s, int num_source_frames);
 
+// world_from_cam of a keyframe.
+Pose pose_of(const tv_keyframe& keyframe);
+
 // The frames of one segment with their final poses, and those of a stretch as they were known when
 // tracked.
 Trajectory trajectory_of(const Flight& flight, int32_t segment);
@@ -72,6 +76,15 @@ std::string map_ply(const std::vector<tv_map_point>& points, const std::vector<R
 struct ColmapModel {
   std::string cameras, images, points;
 };
-ColmapModel colmap_model(const FlightResult& result);
+
+// Pictures that were made of the frames of some keyframes, and the camera that they are of.
+struct ColmapPictures {
+  tv_camera camera{};
+  std::map<int32_t, std::string> names;  // by the keyframe's id
+};
+
+// The longest segment: of the frames as they were tracked, under the source's names, or of pictures
+// that were made of them, with what lies in these.
+ColmapModel colmap_model(const FlightResult& result, const ColmapPictures* pictures = nullptr);
 
 }  // namespace cli

@@ -44,13 +44,6 @@ class View {
   bool is_upright_;
 };
 
-Pose pose_of(const tv_keyframe& k) {
-  Pose pose;
-  std::copy(k.world_from_cam_R, k.world_from_cam_R + 9, pose.R.begin());
-  std::copy(k.world_from_cam_t, k.world_from_cam_t + 3, pose.t.begin());
-  return pose;
-}
-
 void append(Json& list, const Json& numbers) {
   for (const Json& number : numbers) list.push_back(number);
 }

@@ -1,6 +1,7 @@
 // twoview undistort IMAGE...: computes the images that a camera without distortion would have
 // taken.
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <opencv2/imgproc.hpp>
@@ -10,9 +11,11 @@
 #include "base/output.h"
 #include "base/terminal.h"
 #include "files/camera_formats.h"
+#include "files/folder.h"
 #include "files/image_file.h"
 #include "pair/options.h"
 #include "pair/result.h"
+#include "pictures/undistorted.h"
 #include "verbs/camera_options.h"
 #include "verbs/verbs.h"
 
@@ -32,48 +35,6 @@ struct Arguments {
   bool scales_camera = false;
 };
 
-// The position in the old image of each pixel of the new one, by the library's lens models.
-struct Map {
-  cv::Mat place;  // for each new pixel x y in the old image, 32-bit floats
-  // 255 if the lens model is valid there and the position is in the old image, else 0
-  cv::Mat seen;
-};
-
-Map map_to(const tv_camera& lens, const tv_camera& pinhole) {
-  Map map{cv::Mat(pinhole.height, pinhole.width, CV_32FC2),
-          cv::Mat(pinhole.height, pinhole.width, CV_8U)};
-  const auto width = static_cast<size_t>(pinhole.width);
-  std::vector<double> rays(3 * width), pixels(2 * width);
-  std::vector<uint8_t> inside(width);
-  for (int y = 0; y < pinhole.height; ++y) {
-    for (size_t x = 0; x < width; ++x) {
-      rays[3 * x] = (static_cast<double>(x) - pinhole.cx) / pinhole.fx;
-      rays[3 * x + 1] = (y - pinhole.cy) / pinhole.fy;
-      rays[3 * x + 2] = 1;
-    }
-    check(tv_camera_project_points(&lens, rays.data(), pinhole.width, pixels.data(), inside.data()),
-          "cannot project");
-    for (size_t x = 0; x < width; ++x) {
-      const double u = pixels[2 * x], v = pixels[2 * x + 1];
-      const bool seen =
-          inside[x] && u >= -0.5 && v >= -0.5 && u <= lens.width - 0.5 && v <= lens.height - 0.5;
-      map.seen.at<uint8_t>(y, static_cast<int>(x)) = seen ? 255 : 0;
-      map.place.at<cv::Vec2f>(y, static_cast<int>(x)) =
-          seen ? cv::Vec2f(static_cast<float>(u), static_cast<float>(v)) : cv::Vec2f(0, 0);
-    }
-  }
-  return map;
-}
-
-// Interpolates bicubically. At the border the nearest pixels are repeated, and pixels without a
-// position in the old image are black.
-cv::Mat undistorted(const cv::Mat& image, const Map& map) {
-  cv::Mat remapped, result;
-  cv::remap(image, remapped, map.place, cv::noArray(), cv::INTER_CUBIC, cv::BORDER_REPLICATE);
-  remapped.copyTo(result, map.seen);  // pixels without a position stay 0
-  return result;
-}
-
 // The file name of each result: that of the image, with the ending of PNG. Throws BadInput if two
 // results would have the same name.
 std::vector<std::string> result_names(const std::vector<std::string>& images, bool mask) {
@@ -88,6 +49,15 @@ std::vector<std::string> result_names(const std::vector<std::string>& images, bo
   return names;
 }
 
+// The size of the images: that of most by their headers, or of the first that can be read. Throws
+// BadInput where none can.
+cv::Size usual_size(const std::vector<std::string>& images) {
+  std::vector<cv::Size> sizes;
+  for (const std::string& image : images) sizes.push_back(header_size(image));
+  const cv::Size usual = most_frequent(sizes);
+  return usual.area() > 0 ? usual : load_pixels(images[0]).size();
+}
+
 // The camera of the images, which are all of one size.
 tv_camera lens_of(Arguments& a) {
   const bool has_focal = a.focal_35mm > 0;
@@ -100,17 +70,29 @@ tv_camera lens_of(Arguments& a) {
     if (!file.note().empty()) a.common.note(file.note());
     return file.of(name);
   }
-  const cv::Mat image = load_pixels(a.images[0]);
-  if (a.camera.empty()) return film_camera(a.focal_35mm, image.cols, image.rows);
+  const cv::Size size = usual_size(a.images);
+  if (a.camera.empty()) return film_camera(a.focal_35mm, size.width, size.height);
   const tv_camera camera = load_camera(a.camera, name);
-  const std::string note = scaled_note(camera, a.camera, image.cols, image.rows);
+  const std::string note = scaled_note(camera, a.camera, size.width, size.height);
   if (!note.empty()) a.common.note(note);
-  return fitted(camera, a.camera, image.cols, image.rows, a.images[0], true);
+  return fitted(camera, a.camera, size.width, size.height, a.images[0], true);
 }
 
 // The camera's name for messages.
 std::string camera_name(const Arguments& a) {
   return a.camera.empty() ? "of --focal-35mm, of the first image," : a.camera;
+}
+
+constexpr size_t kMostNamed = 3;
+
+// Each with its reason, as long as these are few.
+std::string left_out_note(const std::vector<LeftOut>& left_out) {
+  const size_t count = left_out.size();
+  std::string text =
+      std::to_string(count) + (count == 1 ? " image is left out: " : " images are left out: ");
+  for (size_t k = 0; k < std::min(count, kMostNamed); ++k)
+    text += (k == 0 ? "" : "; ") + left_out[k].reason;
+  return text + (count > kMostNamed ? "; --json names all" : "");
 }
 
 int undistort(Arguments& a) {
@@ -121,9 +103,7 @@ int undistort(Arguments& a) {
   if (lens.width > kMaxSide || lens.height > kMaxSide)
     throw BadInput("camera " + a.camera + " is for images above " + std::to_string(kMaxSide) +
                    " a side");
-  tv_camera pinhole = lens;
-  pinhole.model = TV_CAMERA_PINHOLE;
-  std::fill(std::begin(pinhole.k), std::end(pinhole.k), 0.0);
+  tv_camera pinhole = pinhole_of(lens);
   pinhole.fx *= a.focal_scale;
   pinhole.fy *= a.focal_scale;
   const std::vector<std::string> names = result_names(a.images, a.mask);
@@ -131,30 +111,46 @@ int undistort(Arguments& a) {
   if (!a.camera.empty()) files.keep(camera_path(a.camera));
   for (const std::string& image : a.images) files.keep(image);
   files.require_own({"undistort", {"camera.yaml"}, {}, {"calibration.json"}});
-  const Map map = map_to(lens, pinhole);
+  const UndistortMap map = undistort_map(lens, pinhole);
   const double share = cv::countNonZero(map.seen) / static_cast<double>(map.seen.total());
   if (share == 0)
     throw BadInput("camera " + a.camera +
                    " sees no pixel of the result: check its principal point and "
                    "distortion, or --focal-scale");
   const Progress progress(!common.quiet && a.images.size() > 1);
+  std::vector<std::string> written;
+  std::vector<LeftOut> left_out;
   for (size_t i = 0; i < a.images.size(); ++i) {
-    cv::Mat image = load_pixels(a.images[i]);
-    fitted(whole, camera_name(a), image.cols, image.rows, a.images[i], false);
+    progress.tell(std::to_string(i + 1) + " of " + std::to_string(a.images.size()) + " images");
+    cv::Mat image;
+    try {
+      image = load_pixels(a.images[i]);
+      fitted(whole, camera_name(a), image.cols, image.rows, a.images[i], false);
+    } catch (const BadInput& e) {
+      std::error_code ignored;
+      if (!fs::exists(a.images[i], ignored)) throw;  // a name that was not meant
+      left_out.push_back({a.images[i], e.what()});
+      continue;
+    }
     if (size != image.size()) {
       cv::Mat smaller;
       cv::resize(image, smaller, size, 0, 0, cv::INTER_AREA);
       image = smaller;
     }
     files.add(names[i], png_bytes(undistorted(image, map)));
-    progress.tell(std::to_string(i + 1) + " of " + std::to_string(a.images.size()) + " images");
+    written.push_back(names[i]);
   }
+  if (written.empty()) throw BadInput(left_out[0].reason);
+  if (!left_out.empty()) common.note(left_out_note(left_out));
   if (a.mask) files.add("mask.png", png_bytes(map.seen));
   files.add("camera.yaml", camera_yaml(pinhole));
 
   if (common.json) {
     nlohmann::ordered_json json;
-    json["images"] = names;
+    json["images"] = written;
+    json["left_out"] = nlohmann::ordered_json::array();
+    for (const LeftOut& image : left_out)
+      json["left_out"].push_back({{"image", image.name}, {"reason", image.reason}});
     json["camera"] = "camera.yaml";
     json["image_size"] = {pinhole.width, pinhole.height};
     json["camera_matrix"] = {pinhole.fx, 0, pinhole.cx, 0, pinhole.fy, pinhole.cy, 0, 0, 1};
@@ -173,7 +169,7 @@ int undistort(Arguments& a) {
   if (common.speaks()) {
     char text[160];
     std::snprintf(text, sizeof text, "%zu undistorted, %.1f %% of the pixels seen\nfiles        ",
-                  names.size(), 100 * share);
+                  written.size(), 100 * share);
     std::string line = text + files.folder().string() + ":";
     for (const std::string& name : files.names()) line += " " + name;
     print(notes + line + "\n");
