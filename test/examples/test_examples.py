@@ -178,17 +178,21 @@ class Examples(unittest.TestCase):
         symbols = run("nm", "--undefined-only", self.bin / "10_static_memory")
         self.assertNotRegex(symbols, r"\b(malloc|calloc|realloc)\b")
 
-    def test_odometry(self):
-        if not (self.bin / "13_odometry").exists():
+    def flight(self, name):
+        """40 pictures of a flight of 2 m past a wall of tiles with a nearer half."""
+        if not (self.bin / name).exists():
             self.skipTest("built without odometry")
-        # A flight of 2 m past a wall of tiles with a nearer half.
         random = np.random.default_rng(13)
         tiles = random.integers(0, 256, (2, 200, 400)).astype(np.uint8)
         far, near = tiles.repeat(8, axis=1).repeat(8, axis=2)
-        frames = []
         for k in range(40):
             picture = far[:480, 16 * k : 16 * k + 640].copy()
             picture[280:] = near[280:480, 28 * k : 28 * k + 640]
+            yield picture
+
+    def test_odometry(self):
+        frames = []
+        for k, picture in enumerate(self.flight("13_odometry")):
             frames.append(self.folder / f"flight{k:02}.pgm")
             cv2.imwrite(str(frames[-1]), picture)
         text = self.example("13_odometry", 500, 500, 320, 240, *frames)
@@ -199,6 +203,56 @@ class Examples(unittest.TestCase):
         symbols = run("nm", "--undefined-only", self.bin / "13_odometry")
         self.assertNotRegex(symbols, r"\b(malloc|calloc|realloc)\b")
         self.assertIn("usage", self.example("13_odometry", status=2))
+
+    def test_frame_loop(self):
+        # NV12 whose rows are padded, with frame 5 twice, frame 8 out of order, a clock that begins
+        # anew at frame 20, and a lens cap before frames 30 to 32.
+        stride, text = 704, ""
+        pictures = list(self.flight("16_frame_loop"))
+        order = [*range(6), 5, 6, 8, 7, *range(9, 40)]
+        for k in 30, 31, 32:
+            pictures[k] = np.full_like(pictures[k], 16)
+        random = np.random.default_rng(16)
+        frames, times = self.folder / "frames.nv12", self.folder / "times.txt"
+        with frames.open("wb") as file:
+            for k in order:
+                whole = random.integers(0, 256, (720, stride)).astype(np.uint8)
+                whole[:480, :640] = pictures[k]
+                file.write(whole.tobytes())
+                text += f"{(100 if k < 20 else -0.6) + k / 30:.6f}\n"
+        times.write_text(text)
+        camera = (500, 500, 320, 240, 640, 480)
+        said = self.example("16_frame_loop", *camera, stride, frames, times)
+        self.assertIn("39 frames, ", said)
+        self.assertIn("2 frames left out", said)
+        self.assertIn("0.067 s  the clock began anew after 100.633 s", said)
+        rows = [line for line in said.splitlines() if re.match(r" *[\d.]+ s  (?!the)", line)]
+        words = [row.split()[2] for row in rows]
+        self.assertEqual(len(rows), 39)  # without 5 again, and 7
+        self.assertTrue({"tracking", "weak"} & set(words[15:19]), words)
+        self.assertIn(words[19], ("tracking", "weak"))
+        self.assertEqual(set(words[29:32]), {"lost"})
+        self.assertIn(words[-1], ("tracking", "weak"))
+        # From a pipe, by the clock.
+        with frames.open("rb") as pipe:
+            done = subprocess.run([str(self.bin / "16_frame_loop"), *map(str, camera),
+                                   str(stride), "-"], stdin=pipe, capture_output=True, text=True)
+        self.assertIn("41 frames, ", done.stdout)
+        self.assertIn("0 frames left out", done.stdout)
+        # What the caller did wrong is named.
+        for stride, words in ((639, "the image's stride does not fit its width"),
+                              (0, "stride is out of its range"),
+                              (-704, "stride is out of its range")):
+            self.assertIn(words, self.example("16_frame_loop", *camera, stride, frames, status=2))
+        self.assertIn("cut off", self.example("16_frame_loop", *camera, 700, frames, status=2))
+        self.assertIn("no frame", self.example("16_frame_loop", *camera, 704, "/dev/null",
+                                               status=2))
+        times.write_text("1\n2\n")
+        self.assertIn("TIMES ends", self.example("16_frame_loop", *camera, 704, frames, times,
+                                                 status=2))
+        symbols = run("nm", "--undefined-only", self.bin / "16_frame_loop")
+        self.assertNotRegex(symbols, r"\b(malloc|calloc|realloc|fopen)\b")
+        self.assertIn("usage", self.example("16_frame_loop", status=2))
 
     def against_the_simulator(self, name, *before, seconds=5, options=()):
         """What an example prints that receives a simulated drone for some seconds."""
@@ -271,7 +325,7 @@ class Examples(unittest.TestCase):
                 if not (self.bin / source.stem).exists():
                     continue
                 packages += ["twoview_ardrone", "twoview_h264"]
-            odometry = ("13_odometry", "15_absolute_pose")
+            odometry = ("13_odometry", "15_absolute_pose", "16_frame_loop")
             if source.stem in odometry and not (self.bin / source.stem).exists():
                 continue
             flags = run("pkg-config", "--cflags", "--libs", *packages, env=environment).split()
