@@ -154,6 +154,22 @@ class Drone(unittest.TestCase):
         self.assertIn("568, 0, 320, 0, 567, 180, 0, 0, 1", " ".join(texts[0].split()))
         self.assertIn("-0.52, 0.27, 0, 0, 0", " ".join(texts[0].split()))
 
+    def test_a_lens_of_another_size_is_scaled_where_that_is_wanted(self):
+        big, lens = self.path("big.yaml"), self.path("lens.yaml")
+        pathlib.Path(big).write_text(
+            "image_width: 1280\nimage_height: 720\ncamera_name: c\n"
+            "camera_matrix: {rows: 3, cols: 3, data: [1136, 0, 640.5, 0, 1134, 360.5, 0, 0, 1]}\n"
+            "distortion_model: plumb_bob\n"
+            "distortion_coefficients: {rows: 1, cols: 5, data: [-0.52, 0.27, 0, 0, 0]}\n")
+        ports = [word for c in ("at", "navdata", "video", "control", "recording")
+                 for word in (f"--{c}-port", "0")]
+        command = ("simulate", *ports, "--duration", "0.1", "--camera", big, "--write-camera", lens)
+        self.assert_refused(run(*command), "1280x720", "640x360", "--scale-camera")
+        result = run(*command, "--scale-camera")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("568, 0, 320, 0, 567, 180, 0, 0, 1",
+                      " ".join(pathlib.Path(lens).read_text().split()))
+
     def test_a_recording_holds_what_was_sent(self):
         with Simulator() as drone:
             result = run("record", "--duration", "4", "-o", self.output, "--frames", "--json",

@@ -3,9 +3,12 @@
 // only inside functions that return plain values, since Unity leaves a failing test by longjmp,
 // which skips destructors.
 
+#include <unistd.h>
+
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <functional>
 #include <nlohmann/json.hpp>
@@ -15,6 +18,7 @@
 #include "base/error.h"
 #include "files/camera_formats.h"
 #include "files/camera_set.h"
+#include "files/mask_file.h"
 #include "files/natural_order.h"
 #include "files/pairs_file.h"
 
@@ -29,6 +33,7 @@ void tearDown(void) {}
 
 namespace {
 
+namespace fs = std::filesystem;
 constexpr int kFewestCases = 20;
 
 Json load(const char* name) {
@@ -196,6 +201,56 @@ int num_wrong_orders() {
   return wrong;
 }
 
+// What a case's mask uses of the picture, row by row, or the line of the refusal.
+Json mask_json(const Json& test, const fs::path& folder) {
+  fs::remove_all(folder);
+  fs::create_directories(folder);
+  for (const auto& [name, lines] : test["files"].items()) {
+    fs::create_directories((folder / name).parent_path());
+    std::ofstream file(folder / name);
+    for (const Json& line : lines) file << line.get<std::string>() << "\n";
+  }
+  Masks masks;
+  const auto given = test["given"].get<std::string>();
+  masks.path = given.empty() ? folder.string() : (folder / given).string();
+  try {
+    const cv::Mat mask = masks.of(test["picture"], test["size"][0], test["size"][1]);
+    Json rows = Json::array();
+    for (int y = 0; y < mask.rows; ++y) {
+      std::string row;
+      for (int x = 0; x < mask.cols; ++x) row += mask.at<uint8_t>(y, x) != 0 ? '1' : '0';
+      rows.push_back(row);
+    }
+    return rows;
+  } catch (const BadInput& e) {
+    return e.what();
+  }
+}
+
+int num_wrong_masks() {
+  int wrong = 0;
+  const Json file = load("masks.json");
+  const fs::path folder = fs::temp_directory_path() / ("masks." + std::to_string(::getpid()));
+  for (const Json& test : file["cases"]) {
+    const Json found = mask_json(test, folder);
+    bool right = found == test.value("used", Json());
+    if (test.contains("refused")) {
+      const std::string line = found.is_string() ? found.get<std::string>() : "";
+      right = line.rfind("--mask: ", 0) == 0;
+      for (const Json& word : test["refused"])
+        right = right && line.find(word.get<std::string>()) != std::string::npos;
+    }
+    if (right) continue;
+    ++wrong;
+    std::printf("masks.json: %s: %s\n", test["name"].get<std::string>().c_str(),
+                found.dump().c_str());
+  }
+  fs::remove_all(folder);
+  return wrong;
+}
+
+void test_masks_are_read_as_the_cases_say() { TEST_ASSERT_EQUAL_INT(0, num_wrong_masks()); }
+
 void test_names_are_in_the_cases_order() { TEST_ASSERT_EQUAL_INT(0, num_wrong_orders()); }
 
 void test_pairs_files_are_read_as_the_cases_say() {
@@ -230,6 +285,7 @@ int main(void) {
   RUN_TEST(test_camera_sets_are_read_as_the_cases_say);
   RUN_TEST(test_files_of_every_format_are_read_as_the_cases_say);
   RUN_TEST(test_the_entry_that_serves_an_image_is_the_cases);
+  RUN_TEST(test_masks_are_read_as_the_cases_say);
   RUN_TEST(test_names_are_in_the_cases_order);
   return UNITY_END();
 }

@@ -160,6 +160,23 @@ class Mavlink(unittest.TestCase):
         self.assertGreater(kinds["ATTITUDE"], 100)
         self.assertIn("TIMESYNC", kinds)
 
+    def test_the_log_is_read_by_mavutil(self):
+        from pymavlink import mavutil
+        log = mavutil.mavlink_connection(str(self.recording / "vehicle.tlog"))
+        kinds, times = {}, []
+        while (message := log.recv_msg()) is not None:
+            kinds[message.get_type()] = kinds.get(message.get_type(), 0) + 1
+            times.append(message._timestamp)
+            self.assertNotEqual(message.get_type(), "BAD_DATA")
+        self.assertGreater(kinds["ATTITUDE"], 100)
+        self.assertEqual(times, sorted(times))
+        data, own, at = (self.recording / "vehicle.tlog").read_bytes(), [], 0
+        while at < len(data):  # the packets and their times are those of the file
+            own.append(int.from_bytes(data[at:at + 8], "big") * 1e-6)
+            at += 20 + data[at + 9]
+        self.assertEqual(sum(kinds.values()), len(own))
+        np.testing.assert_allclose(times, own, atol=1e-5)
+
     def test_two_frames_of_the_recording_have_metres_and_gravity(self):
         output = self.folder / "pair"
         result = run("reconstruct", "--recording", self.recording, "--camera", self.camera,

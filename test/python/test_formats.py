@@ -12,6 +12,8 @@ except ImportError as missing:
     raise unittest.SkipTest(f"{missing}: run scripts/bootstrap test")
 
 from twoview_tools import formats
+from twoview_tools.colmap.errors import BadInput
+from twoview_tools.colmap.masks import Masks
 from twoview_tools.folders import natural_key
 
 FOLDER = pathlib.Path(__file__).resolve().parents[1] / "formats"
@@ -111,6 +113,28 @@ class TestNames(unittest.TestCase):
             with self.subTest(case=case["name"]):
                 for names in (case["names"][::-1], sorted(case["names"])):
                     self.assertEqual(sorted(names, key=natural_key), case["names"])
+
+
+class TestMasks(unittest.TestCase):
+    def test_masks_are_read_as_the_cases_say(self):
+        import tempfile
+        for case, _ in cases("masks"):
+            with self.subTest(case=case["name"]), tempfile.TemporaryDirectory() as folder:
+                for name, lines in case["files"].items():
+                    path = pathlib.Path(folder, name)
+                    path.parent.mkdir(exist_ok=True)
+                    path.write_text("".join(line + "\n" for line in lines))
+                given = str(pathlib.Path(folder, case["given"]))
+                luma = np.zeros(case["size"][::-1], np.uint8)
+                if "used" in case:
+                    used = Masks(given).of(case["picture"], luma)
+                    self.assertEqual(["".join("01"[int(v)] for v in row) for row in used],
+                                     case["used"])
+                    continue
+                with self.assertRaises(BadInput) as refusal:
+                    Masks(given).of(case["picture"], luma)
+                for word in ["--mask: ", *case["refused"]]:
+                    self.assertIn(word, str(refusal.exception))
 
 
 class TestFiles(unittest.TestCase):

@@ -25,6 +25,7 @@ struct Arguments {
   int recording_port = 5553;
   double duration = 0;
   std::string camera, written_camera, truth, surfaces;
+  bool scales_camera = false;
   bool has_tour = false;
   std::vector<std::string> images;
   std::vector<double> start = {0, 0};
@@ -40,9 +41,11 @@ struct Arguments {
   bool json = false, quiet = false;
 };
 
+constexpr int kWidth = 640, kHeight = 360;  // pixels of the drone's camera
+
 // Approximately the lens of an AR.Drone 2.0: the mean of five published calibrations.
 tv_camera usual_camera() {
-  return {TV_CAMERA_BROWN_CONRADY, 640, 360, 0, 568, 567, 320, 180, {-0.52, 0.27, 0, 0, 0}};
+  return {TV_CAMERA_BROWN_CONRADY, kWidth, kHeight, 0, 568, 567, 320, 180, {-0.52, 0.27, 0, 0, 0}};
 }
 
 // Shows the images forwards and backwards alternately, so that the film has no jump.
@@ -71,11 +74,9 @@ simulator::ServerOptions server_options(const Arguments& a) {
   o.seed = a.seed;
   o.sensors = a.sensors;
   o.sensors.seed = a.seed;
-  o.camera = a.camera.empty() ? usual_camera() : load_camera(a.camera);
-  if (o.camera.width != 640 || o.camera.height != 360) {
-    throw BadInput("camera " + a.camera + " is for " + std::to_string(o.camera.width) + " x " +
-                   std::to_string(o.camera.height) + " images; the drone's are 640 x 360");
-  }
+  o.camera = a.camera.empty() ? usual_camera()
+                              : fitted(load_camera(a.camera), a.camera, kWidth, kHeight,
+                                       "of the drone", a.scales_camera);
   o.body_from_camera = room::kForwardCamera;
   o.pixel_noise = a.pixel_noise;
   o.frames_per_second = a.frames_per_second;
@@ -196,6 +197,8 @@ void add_faults(CLI::App& verb, Arguments& a) {
 void add_world(CLI::App& verb, Arguments& a) {
   verb.add_option("--camera", a.camera, "lens of the 640 x 360 camera, OpenCV or ROS YAML")
       ->type_name("FILE");
+  verb.add_flag("--scale-camera", a.scales_camera,
+                "the lens is of another size of the same picture: scale it");
   verb.add_option("--write-camera", a.written_camera,
                   "write that lens, for --camera of the verbs that read a recording")
       ->type_name("FILE");
