@@ -29,8 +29,8 @@ def _epilog():
                            subsequent_indent="    ", break_on_hyphens=False)
              for kind, ids in lists.items()]
     return "\n".join(["systems, for --systems:", *lines, "",
-                      "exit status: 0 a report, whatever its rows say; 2 bad input; 130 interrupted",
-                      "(the same command goes on)"])
+                      "exit status: 0 a report, whatever its rows say; 2 bad input; 130",
+                      "interrupted (the same command goes on)"])
 
 
 def make_parser():
@@ -49,8 +49,19 @@ def make_parser():
     parser.add_argument("--systems", metavar="A,B,..",
                         help="only these: ids, families (opengv, opencv, ..), pipelines, solvers, "
                              "triangulations, all named below (default: all)")
-    parser.add_argument("--matches", default="twoview", choices=PIPELINES,
-                        help="whose matches the solvers get (default twoview)")
+    parser.add_argument("--matches", default="twoview", metavar="ID|[NAME=]DIR",
+                        help="whose matches the solvers get: a pipeline's id (default twoview), or "
+                             "a folder of your own with a file a pair, such as a_b_matches.npz "
+                             "(docs/formats.md), which then is a pipeline, too: these matches and "
+                             "twoview's estimate")
+    parser.add_argument("--poses", action="append", default=[], metavar="[NAME=]FILE",
+                        help="poses of your own system, a pipeline of its own: name0 name1 and the "
+                             "rows of [R t] a line; may be given several times")
+    parser.add_argument("--tables", default="", metavar="csv,tex",
+                        help="also write the tables of systems as systems.csv and systems.tex")
+    parser.add_argument("--figures", default="", metavar="svg,pdf,png",
+                        help="also write the plots as files, in REPORT_DIR/figures (needs "
+                             "matplotlib)")
     parser.add_argument("--max-error-px", type=float, default=1.0, metavar="E",
                         help="inlier threshold of every system that takes one (default 1)")
     parser.add_argument("--resize", type=int, metavar="L",

@@ -2,25 +2,30 @@
 
 import contextlib
 import hashlib
+import importlib.util
 import json
 import os
+import re
 import signal
 import sys
 import time
 
 import numpy as np
 
-from .. import formats
+from .. import formats, own_matches
 from ..accuracy import datasets
 from ..folders import foreign_result, foreign_words
 from ..progress import Lines, on_terminal
 from ..sizes import MAX_NATIVE_SIDE, RESIZE_LONG_SIDE
 from ..unread import unread_picture
-from . import cluster, results, systems
-from .arguments import PROGRAM, make_parser
+from . import cluster, extras, results, systems
+from .arguments import PIPELINES, PROGRAM, make_parser
 
 FORMAT = 1  # increase it if a change here changes the stored result of a pair
 REFERENCE_TIMEOUT_S = 3600
+TABLES, FIGURES = ("csv", "tex"), ("svg", "pdf", "png")
+
+
 class BadInput(Exception):
     """Bad input: one line for the user and exit status 2."""
 
@@ -41,7 +46,80 @@ def parse(words):
         arguments.systems = systems.chosen(arguments.systems)
     except ValueError as error:
         raise BadInput(f"--systems: {error}") from error
+    arguments.own = own_systems(arguments)
+    arguments.systems += [entry["id"] for entry in arguments.own]
+    arguments.tables = chosen_words("--tables", arguments.tables, TABLES)
+    arguments.figures = chosen_words("--figures", arguments.figures, FIGURES)
+    if arguments.figures and importlib.util.find_spec("matplotlib") is None:
+        raise BadInput("--figures needs matplotlib: pip install matplotlib")
     return arguments
+
+
+def chosen_words(flag, text, known):
+    words = [word for word in text.split(",") if word]
+    for word in words:
+        if word not in known:
+            raise BadInput(f"{flag}: '{word}' is none of {', '.join(known)}")
+    return list(dict.fromkeys(words))
+
+
+def named_path(given):
+    """(name, path) of [NAME=]PATH; without a name that of the file or folder."""
+    if "=" in given and not os.path.exists(given):
+        return tuple(given.split("=", 1))
+    return os.path.splitext(os.path.basename(os.path.abspath(given)))[0], given
+
+
+def own_systems(arguments):
+    """The user's systems: the folder of --matches, which arguments.matches then names, and the
+    files of --poses."""
+    entries = []
+    try:
+        if arguments.matches not in PIPELINES:
+            name, folder = named_path(arguments.matches)
+            if not os.path.isdir(folder):
+                raise BadInput(f"--matches: {arguments.matches} is no folder and none of "
+                               f"{', '.join(PIPELINES)}")
+            entries.append({"id": name, "note": "matches of your own, twoview's estimate",
+                            "options": {"matches": os.path.abspath(folder)},
+                            "folder": own_matches.MatchFolder(folder)})
+            arguments.matches = name
+        for given in arguments.poses:
+            name, path = named_path(given)
+            entries.append({"id": name, "note": "poses of your own",
+                            "options": {"poses": os.path.abspath(path)},
+                            "poses": own_matches.read_poses(path)})
+    except own_matches.Refused as error:
+        raise BadInput(str(error)) from error
+    except OSError as error:
+        raise BadInput(f"{error.filename}: {error.strerror}") from error
+    names = [s.id for s in systems.SYSTEMS] + [entry["id"] for entry in entries]
+    for entry in entries:
+        if not re.fullmatch(r"[\w.+-]+", entry["id"]) or names.count(entry["id"]) > 1:
+            raise BadInput(f"'{entry['id']}' cannot be the name of your system; give NAME=PATH "
+                           "with another name")
+    return entries
+
+
+def own_of_pair(entries, name0, name1):
+    """What the user's systems have of a pair, as a task has it. Raises BadInput."""
+    found = []
+    for entry in entries:
+        options = dict(entry["options"])
+        if "folder" in entry:
+            try:
+                options["file"], options["exchanged"] = entry["folder"].find(name0, name1)
+            except own_matches.Refused as error:
+                raise BadInput(str(error)) from error
+            if options["file"]:
+                with open(options["file"], "rb") as file:
+                    options["sha256"] = hashlib.sha256(file.read()).hexdigest()
+        else:
+            pose = own_matches.pose_of_pair(entry["poses"], name0, name1)
+            options["listed"] = bool({(name0, name1), (name1, name0)} & set(entry["poses"]))
+            options["pose"] = pose and {"R": pose[0].tolist(), "t": pose[1].tolist()}
+        found.append({"id": entry["id"], "note": entry["note"], "options": options})
+    return found
 
 
 def unique_names(paths):
@@ -86,6 +164,7 @@ def make_task(arguments, name, folder, pair, cameras):
     truth = None if pair.R is None else {"R": pair.R.tolist(), "t": pair.t.tolist()}
     return {"what": "pair", "set": name, "views": views, "truth": truth,
             "resize": arguments.resize, "systems": arguments.systems,
+            "own": own_of_pair(arguments.own, pair.name0, pair.name1),
             "matches_of": arguments.matches, "max_error_px": arguments.max_error_px,
             "seed": arguments.seed, "timeout_s": arguments.timeout, "library": library_path()}
 
@@ -310,6 +389,7 @@ def compare(arguments):
     }
     report = results.make_report(arguments, run, pairs)
     results.write(folder, report, pairs, tasks)
+    extras.write(folder, report, pairs, arguments.tables, arguments.figures)
     store.remove()
     if not arguments.quiet:
         # The report is complete even if nobody reads this output.

@@ -129,6 +129,7 @@ def render(report, pairs, tasks):
     index, images = thumbnails(tasks)
     drawn = [s for kind in ("pipeline", "solver")
              for s in systems.of_kind(kind, report["options"]["systems"])]
+    drawn += systems.own_of(report["own"])
     names = {(s.kind, s.id): i for i, s in enumerate(drawn)}
     data = {"systems": [{"id": s.id, "name": s.name, "kind": s.kind, "colour": plots.colour(s)}
                         for s in drawn],

@@ -73,8 +73,11 @@ def run_pair(task):
     rows = {kind: {} for kind in systems.KINDS}
     wanted = set(task["systems"])
     answers, overlays = {}, {}
-    for system in systems.of_kind("pipeline"):
+    for system in [*systems.of_kind("pipeline"), *systems.own_of(task["own"])]:
         if system.id not in wanted and system.id != task["matches_of"]:
+            continue
+        if "poses" in system.options:
+            rows["pipeline"][system.id] = _row(task, *_own_pose(system.options), None)
             continue
         answer, status, message = run.call(system, {})
         if answer:
@@ -93,6 +96,14 @@ def run_pair(task):
             "cameras": views and views["cameras"], "sizes": views and views["sizes"],
             "rows": rows, "triangulated": pose, "overlays": overlays,
             "seconds": run.seconds}
+
+
+def _own_pose(options):
+    """(answer, status, message) of a pose that the user's file has, or has not."""
+    if not options["listed"]:
+        return None, "failed", f"not in {options['poses']}"
+    pose = options["pose"] or {"R": None, "t": None}
+    return {**pose, "num_inliers": None, "ms": {}}, "ok", ""
 
 
 def _matches(answer):
@@ -154,7 +165,7 @@ def _row(task, answer, status, message, matches):
                                 "principal_point_shift_px")
                     if key in answer})
         row["num_inliers"], row["ms"] = answer["num_inliers"], _rounded(answer["ms"])
-        row["time_ms"] = round(sum(answer["ms"].values()), 3)
+        row["time_ms"] = round(sum(answer["ms"].values()), 3) if answer["ms"] else None
     if matches is not None:
         row["num_matches"] = len(matches)
     reference = task["reference"]

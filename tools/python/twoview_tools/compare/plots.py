@@ -9,7 +9,8 @@ from plotly.colors import qualitative
 from . import results, systems
 
 PALETTE = qualitative.D3
-FAMILIES = {"twoview": 0, "pycolmap": 1, "colmap": 3, "cv2": 2, "poselib": 4, "pyopengv": 5}
+FAMILIES = {"twoview": 0, "pycolmap": 1, "colmap": 3, "cv2": 2, "poselib": 4, "pyopengv": 5,
+            "own": 6}
 DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
 MAX_ERROR_DEG, MIN_ERROR_DEG = 20.0, 0.01
 
@@ -36,7 +37,8 @@ def _figure(traces, x, y, **layout):
 
 def _listed(report, kind):
     present = {s["id"] for s in report["systems"] if s["kind"] == kind and not s["missing"]}
-    return systems.of_kind(kind, present)
+    own = systems.own_of(report["own"]) if kind == "pipeline" else []
+    return [*systems.of_kind(kind, present), *own]
 
 
 def _known(pairs):

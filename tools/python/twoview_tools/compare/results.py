@@ -91,10 +91,12 @@ def _middle(values):
 def time_shares(pairs):
     """The seconds of CPU of each module's systems over all pairs."""
     modules = {f"{s.kind} {s.id}": s.module for s in systems.SYSTEMS}
+    # The estimate is ours where the matches are not.
     seconds = {}
     for pair in pairs:
         for key, value in pair["seconds"].items():
-            seconds[modules[key]] = seconds.get(modules[key], 0) + value
+            module = modules.get(key, "twoview")
+            seconds[module] = seconds.get(module, 0) + value
     return seconds
 
 
@@ -102,7 +104,7 @@ def make_report(arguments, run, pairs):
     known = [p["reference"] is not None for p in pairs]
     sets = list(dict.fromkeys(p["set"] for p in pairs))
     listed = []
-    for system in systems.SYSTEMS:
+    for system in (*systems.SYSTEMS, *systems.own_of(arguments.own)):
         if system.id not in arguments.systems or system.kind == "triangulation":
             continue
         rows = [p["rows"][system.kind][system.id] for p in pairs]
@@ -123,6 +125,7 @@ def make_report(arguments, run, pairs):
         "reference_words": reference_words(arguments, run, pairs),
         "reference_of_sets": run["reference_of_sets"],
         "matches_of": arguments.matches,
+        "own": [{key: entry[key] for key in ("id", "note", "options")} for entry in arguments.own],
         "num_pairs": len(pairs), "sets": {s: sum(p["set"] == s for p in pairs) for s in sets},
         "options": {"max_error_px": arguments.max_error_px, "resize": run["resize"],
                     "seed": arguments.seed, "timeout_s": arguments.timeout,

@@ -44,9 +44,10 @@ def _pipelines():
 
 
 def _solvers():
-    for method, note in (("five-point", "its default; from the pixels of the matches alone, as the "
-                                        "peers: the row twoview of the pipelines also knows how "
-                                        "precise each keypoint is, from its size"), ("eight-point", "the paper's method"),
+    five_point = ("its default; from the pixels of the matches alone, as the peers: the row "
+                  "twoview of the pipelines also knows how precise each keypoint is, from its "
+                  "size")
+    for method, note in (("five-point", five_point), ("eight-point", "the paper's method"),
                          ("upright", "gravity is the reference pose's: two of the three angles "
                                      "are given")):
         yield System("twoview_" + method.replace("-", "_"), f"twoview {method}", "solver",
@@ -76,6 +77,11 @@ def _triangulations():
 
 SYSTEMS = (*_pipelines(), *_solvers(), *_triangulations())
 KINDS = ("pipeline", "solver", "triangulation")
+
+
+def own_of(entries):
+    """The user's own systems of these entries: {"id", "note", "options"}; all are pipelines."""
+    return [System(e["id"], e["id"], "pipeline", "own", e["options"], e["note"]) for e in entries]
 
 
 def of_kind(kind, ids=None):

@@ -54,10 +54,12 @@ class Views:
     """The two images of a task, and their cameras at the scale of the images."""
 
     def __init__(self, task):
-        self.gray, self.cameras = [], []
+        self.gray, self.cameras, self.file_sizes = [], [], []
         for view in task["views"]:
             image, scale_x, scale_y = luma(view["path"], task["resize"])
             self.gray.append(image)
+            self.file_sizes.append((round(image.shape[1] / scale_x),
+                                    round(image.shape[0] / scale_y)))
             K = datasets.scale_K(np.array(view["K"]), scale_x, scale_y)
             self.cameras.append((K, view["distortion"]))
         self.sizes = [image.shape[::-1] for image in self.gray]
@@ -150,6 +152,31 @@ def run_colmap_program(views, options, task):
             **matches_answer(matches)}, watch.ms
 
 
+def run_own(views, options, task):
+    """Matches of the user's, and twoview's estimate from them."""
+    from .. import own_matches
+    from ..accuracy import twoview_ctypes
+    if options["file"] is None:
+        raise Failed(f"no file of this pair in {options['matches']}")
+    given = own_matches.read_matches(options["file"])
+    pixels = [given.pixels0, given.pixels1]
+    if options["exchanged"]:
+        pixels.reverse()
+    whole = own_matches.Matches(*pixels, given.ratios)
+    own_matches.require_pixels(whole, views.file_sizes, options["file"])
+    scaled = [(p + 0.5) * (np.array(size) / file_size) - 0.5
+              for p, size, file_size in zip(pixels, views.sizes, views.file_sizes)]
+    matches = views.matches(*scaled, given.ratios)
+    context = twoview_context(64, 64, max(8192, 1 << (len(given) - 1).bit_length()))
+    watch = Stopwatch()
+    R, t, inliers, found = estimators.run_twoview(context, matches, None, task["seed"])
+    watch.lap("estimate")
+    return {**pose_answer(R, t, inliers, found),
+            "config": twoview_ctypes.enum_name("kind", found.kind),
+            "verdict": twoview_ctypes.enum_name("verdict", found.verdict),
+            "probability_wrong": found.probability_wrong, **matches_answer(matches)}, watch.ms
+
+
 def pose_answer(R, t, inliers, found=None):
     """The answer with a pose. `found` is our library's tv_two_view, whose pose may refer to cameras
     with a shifted principal point."""
@@ -169,8 +196,8 @@ def matches_answer(matches):
 
 def pipeline(system, task, _):
     views = Views(task)
-    run = {"twoview": run_twoview, "colmap": run_colmap_program}.get(system.module,
-                                                                     run_peer_pipeline)
+    run = {"twoview": run_twoview, "colmap": run_colmap_program,
+           "own": run_own}.get(system.module, run_peer_pipeline)
     answer, ms = run(views, system.options, task)
     return {**answer, "ms": ms, "cameras": [[K.tolist(), list(d)] for K, d in views.cameras],
             "sizes": [list(map(int, size)) for size in views.sizes]}
@@ -316,7 +343,7 @@ def answer(request, matches):
     if call == "reference":
         from . import reference
         return reference.reconstruct(task)
-    system = next(s for s in systems.SYSTEMS
+    system = next(s for s in (*systems.SYSTEMS, *systems.own_of(task.get("own", ())))
                   if s.id == request["system"] and s.kind == request["call"])
     run = {"pipeline": pipeline, "solver": solver, "triangulation": triangulation}[call]
     return run(system, task, matches)
