@@ -98,6 +98,7 @@ class Files(unittest.TestCase):
                 (("match 3", "not finite"), {"mkpts0": A, "mkpts1": nan}),
                 (("match 4", "(900, 1)", "320x320"), {"mkpts0": A, "mkpts1": far}),
                 (("normalised",), {"mkpts0": A / 320, "mkpts1": B / 320}),
+                (("normalised", "image 1"), {"mkpts0": A, "mkpts1": B / 320}),
                 (("matched smaller",), {"mkpts0": A / 2, "mkpts1": B / 2}),
                 (("shapes",), {"mkpts0": A, "mkpts1": B[:3]}),
                 (("mkpts0", "(n, 2)"), {"mkpts0": A.T, "mkpts1": B}),
@@ -155,8 +156,9 @@ class Report(unittest.TestCase):
             depth = RANDOM.uniform(15, 60, 200)
             left = np.column_stack([x, y])
             right = np.column_stack([x - 994.978 / depth + 31.086, y])
+            half = [(pixels + 0.5) / 2 - 0.5 for pixels in (left, right)]
             np.savez(os.path.join(folder, "net", "motorcycle_left_motorcycle_right.npz"),
-                     mkpts0=left, mkpts1=right)
+                     mkpts0=half[0], mkpts1=half[1])
             own_file = support.write(
                 folder, "mine.txt", " ".join([*support.IMAGES, "1 0 0 -1 0 1 0 0 0 0 1 0\n"]))
             out = os.path.join(folder, "report")
@@ -164,12 +166,13 @@ class Report(unittest.TestCase):
                      "twoview,twoview_five_point,poselib_solver,twoview_linear_ls")
             for bad, message in ((("--matches", "nothing"), "is no folder"),
                                  (("--poses", "twoview=" + own_file), "another name"),
+                                 (("--matches-resize", "640"), "with a folder"),
                                  (("--figures", "bmp"), "svg, pdf, png")):
                 done = support.run(*words, *bad)
                 self.assertEqual((done.returncode, done.stderr.count("\n")), (2, 1), done.stderr)
                 self.assertIn(message, done.stderr)
             done = support.run(*words, "--matches", os.path.join(folder, "net"), "--poses",
-                               "hand=" + own_file, "--tables", "csv,tex", "--figures", "svg,pdf")
+                               "hand=" + own_file, "--matches-resize", 741 // 2 + 1, "--tables", "csv,tex", "--figures", "svg,pdf")
             self.assertEqual(done.returncode, 0, done.stderr)
             with open(os.path.join(out, "report.json"), encoding="utf-8") as f:
                 report = json.load(f)

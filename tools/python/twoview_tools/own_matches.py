@@ -276,13 +276,14 @@ def read_matches(path):
     return matches
 
 
-def require_pixels(matches, sizes, name):
+def require_pixels(matches, sizes, name, may_be_smaller=True):
     """Refused for matches that are no pixels of images of these sizes, [(width, height)] of both:
-    not finite, outside, normalised, or of smaller pictures."""
+    not finite, outside, normalised, or, with may_be_smaller, apparently of smaller pictures."""
     both = (matches.pixels0, matches.pixels1)
-    if max(sizes[0]) > 2 * MOST_NORMALISED and all(
-            (np.abs(pixels) <= MOST_NORMALISED).all() for pixels in both):
-        raise Refused(f"{name} has normalised coordinates (none is above 2), and pixels are needed")
+    for image, (pixels, size) in enumerate(zip(both, sizes)):
+        if max(size) > 2 * MOST_NORMALISED and (np.abs(pixels) <= MOST_NORMALISED).all():
+            raise Refused(f"{name} has normalised coordinates in image {image} (none is above 2), "
+                          "and pixels are needed")
     for image, (pixels, (width, height)) in enumerate(zip(both, sizes)):
         inside = ((pixels >= -1) & (pixels <= [width, height])).all(axis=1)
         if inside.all():
@@ -293,10 +294,11 @@ def require_pixels(matches, sizes, name):
                 "picture" if np.isfinite(pixels[match]).all() else
                 "has a coordinate that is not finite")
         raise Refused(f"{name}: match {match} (the first is 0) {what} in image {image}")
-    if len(matches) >= TELLING and all((2 * pixels < size).all()
+    if may_be_smaller and len(matches) >= TELLING and all((2 * pixels < size).all()
                                        for pixels, size in zip(both, sizes)):
         raise Refused(f"{name} has no match in the right or the lower half of either picture: were "
-                      "they matched smaller?")
+                      "they matched smaller? --matches-resize L says their longer side then, 0 that "
+                      "they were not")
 
 
 # ---- folders -------------------------------------------------------------------------------------

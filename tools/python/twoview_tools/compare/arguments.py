@@ -54,6 +54,9 @@ def make_parser():
                              "a folder of your own with a file a pair, such as a_b_matches.npz "
                              "(docs/formats.md), which then is a pipeline, too: these matches and "
                              "twoview's estimate")
+    parser.add_argument("--matches-resize", type=int, metavar="L",
+                        help="the longer side to which your matcher made the pictures smaller; 0: "
+                             "it matched them as they are")
     parser.add_argument("--poses", action="append", default=[], metavar="[NAME=]FILE",
                         help="poses of your own system, a pipeline of its own: name0 name1 and the "
                              "rows of [R t] a line; may be given several times")

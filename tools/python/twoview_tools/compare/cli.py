@@ -40,6 +40,9 @@ def parse(words):
         raise BadInput("--seed: from 0 to 2147483647")
     if not arguments.max_error_px > 0 or not arguments.timeout > 0:
         raise BadInput("--max-error-px and --timeout: above 0")
+    if arguments.matches_resize is not None and (arguments.matches_resize < 0
+                                                 or arguments.matches in PIPELINES):
+        raise BadInput("--matches-resize: not below 0, and with a folder of --matches")
     if (arguments.resize or 0) < 0 or arguments.max_pairs < 0:
         raise BadInput("--resize and --max-pairs: not below 0")
     try:
@@ -81,7 +84,8 @@ def own_systems(arguments):
                 raise BadInput(f"--matches: {arguments.matches} is no folder and none of "
                                f"{', '.join(PIPELINES)}")
             entries.append({"id": name, "note": "matches of your own, twoview's estimate",
-                            "options": {"matches": os.path.abspath(folder)},
+                            "options": {"matches": os.path.abspath(folder),
+                                        "matches_resize": arguments.matches_resize},
                             "folder": own_matches.MatchFolder(folder)})
             arguments.matches = name
         for given in arguments.poses:

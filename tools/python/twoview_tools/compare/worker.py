@@ -163,9 +163,11 @@ def run_own(views, options, task):
     if options["exchanged"]:
         pixels.reverse()
     whole = own_matches.Matches(*pixels, given.ratios)
-    own_matches.require_pixels(whole, views.file_sizes, options["file"])
-    scaled = [(p + 0.5) * (np.array(size) / file_size) - 0.5
-              for p, size, file_size in zip(pixels, views.sizes, views.file_sizes)]
+    resize = options["matches_resize"]
+    matched = [datasets.resized_shape(*size, resize or 0) for size in views.file_sizes]
+    own_matches.require_pixels(whole, matched, options["file"], may_be_smaller=resize is None)
+    scaled = [(p + 0.5) * (np.array(size) / was) - 0.5
+              for p, size, was in zip(pixels, views.sizes, matched)]
     matches = views.matches(*scaled, given.ratios)
     context = twoview_context(64, 64, max(8192, 1 << (len(given) - 1).bit_length()))
     watch = Stopwatch()
