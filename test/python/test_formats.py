@@ -107,6 +107,25 @@ class TestChoice(unittest.TestCase):
         self.assertIsNone(formats.choose_camera({}, "x.png"))
 
 
+class TestRotations(unittest.TestCase):
+    def test_poses_of_a_kitti_file_are_made_rotations(self):
+        import tempfile
+        from twoview_tools.odometry import poses
+        with tempfile.NamedTemporaryFile("w", suffix=".txt") as file:
+            def read(line):
+                file.seek(0)
+                file.truncate()
+                file.write("1 0 0 0 0 1 0 0 0 0 1 0\n" + line)
+                file.flush()
+                return poses.read_kitti(file.name, [0.0, 1.0])
+            R = read("0.87 -0.5 0 1 0.5 0.87 0 2 0 0 0.999 3\n").rotations[1]
+            np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-14)
+            for line, word in (("1.03 0 0 0 0 1 0 0 0 0 1 0\n", "0.03"),
+                               ("1 0 0 0 0 1 0 0 0 0 -1 0\n", "reflection")):
+                with self.assertRaisesRegex(poses.PoseError, f"line 2.*{word}"):
+                    read(line)
+
+
 class TestNames(unittest.TestCase):
     def test_names_are_in_the_cases_order(self):
         for case, _ in cases("names"):
