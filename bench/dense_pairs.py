@@ -82,8 +82,8 @@ def bicycle():
     fours = known.reshape(known.shape[0] // 2, 2, known.shape[1] // 2, 2)
     known = (fours.max((1, 3)) + fours.min((1, 3))) / 4  # the mean of the extremes, halved
     known[fours.max((1, 3)) - fours.min((1, 3)) > 2] = np.nan
-    return Pair("bicycle", halves, 1948.17 / 2, ((532.418 + 0.5) / 2 - 0.5, (488.228 + 0.5) / 2 - 0.5),
-                81.932 / 2, 128, known)
+    centre = ((532.418 + 0.5) / 2 - 0.5, (488.228 + 0.5) / 2 - 0.5)
+    return Pair("bicycle", halves, 1948.17 / 2, centre, 81.932 / 2, 128, known)
 
 
 # ---- Rendered rooms: boxes with sides parallel to the axes of a world that is turned against the
@@ -192,20 +192,29 @@ def rendered(name, boxes, position, yaw, pitch, baseline, seed):
 
 def plain_room():
     boxes = [Box((0, 0, 0), (5, 4, 2.5), "plain/wood", True),
-             Box((4.98, 0.6, 1.2), (5, 1.6, 1.9), "picture"), Box((4.97, 2.2, 0), (5, 3.1, 2.05), "wood"),
-             Box((2.4, 1.4, 0.70), (3.5, 2.4, 0.75), "wood"), Box((2.5, 1.5, 0), (2.56, 1.56, 0.7), "dark"),
-             Box((2.5, 2.3, 0), (2.56, 2.36, 0.7), "dark"), Box((3.4, 1.5, 0), (3.46, 1.56, 0.7), "dark"),
-             Box((2.9, 1.7, 0.75), (3.1, 1.9, 1.0), "picture"), Box((3.9, 3.2, 0), (4.7, 3.95, 1.8), "plain"),
-             Box((2.2, 0.02, 1.1), (3.2, 0.04, 1.8), "picture"), Box((3.6, 0.3, 0), (4.1, 0.8, 0.9), "cloth")]
+             Box((4.98, 0.6, 1.2), (5, 1.6, 1.9), "picture"),
+             Box((4.97, 2.2, 0), (5, 3.1, 2.05), "wood"),
+             Box((2.4, 1.4, 0.70), (3.5, 2.4, 0.75), "wood"),
+             Box((2.5, 1.5, 0), (2.56, 1.56, 0.7), "dark"),
+             Box((2.5, 2.3, 0), (2.56, 2.36, 0.7), "dark"),
+             Box((3.4, 1.5, 0), (3.46, 1.56, 0.7), "dark"),
+             Box((2.9, 1.7, 0.75), (3.1, 1.9, 1.0), "picture"),
+             Box((3.9, 3.2, 0), (4.7, 3.95, 1.8), "plain"),
+             Box((2.2, 0.02, 1.1), (3.2, 0.04, 1.8), "picture"),
+             Box((3.6, 0.3, 0), (4.1, 0.8, 0.9), "cloth")]
     return rendered("plain room", boxes, (0.5, 1.7, 1.35), 0.06, 0.12, 0.12, 11)
 
 
 def plain_corridor():
     boxes = [Box((0, 0, 0), (9, 1.8, 2.4), "plain/tiles", True),
-             Box((2.0, 0, 0), (2.9, 0.03, 2.0), "wood"), Box((5.0, 1.77, 0), (5.9, 1.8, 2.0), "wood"),
-             Box((3.3, 1.45, 0), (4.1, 1.8, 0.9), "cloth"), Box((3.5, 1.5, 0.9), (3.7, 1.7, 1.2), "dark"),
-             Box((3.6, 0, 1.3), (4.4, 0.02, 1.9), "picture"), Box((1.7, 1.3, 0), (1.75, 1.35, 1.7), "dark"),
-             Box((8.98, 0.4, 0.8), (9, 1.3, 1.8), "picture"), Box((6.2, 0, 0), (6.7, 0.4, 1.4), "plain")]
+             Box((2.0, 0, 0), (2.9, 0.03, 2.0), "wood"),
+             Box((5.0, 1.77, 0), (5.9, 1.8, 2.0), "wood"),
+             Box((3.3, 1.45, 0), (4.1, 1.8, 0.9), "cloth"),
+             Box((3.5, 1.5, 0.9), (3.7, 1.7, 1.2), "dark"),
+             Box((3.6, 0, 1.3), (4.4, 0.02, 1.9), "picture"),
+             Box((1.7, 1.3, 0), (1.75, 1.35, 1.7), "dark"),
+             Box((8.98, 0.4, 0.8), (9, 1.3, 1.8), "picture"),
+             Box((6.2, 0, 0), (6.7, 0.4, 1.4), "plain")]
     return rendered("plain corridor", boxes, (0.3, 0.8, 1.4), 0.10, 0.06, 0.10, 12)
 
 
@@ -259,8 +268,8 @@ class Densifier:
         return self.points[:count.value]
 
     def disparities(self, points):
-        """Disparity at each pixel of picture 0, NaN where there is none: of the points that round to
-        a pixel, the first."""
+        """Disparity at each pixel of picture 0, NaN where there is none: of the points that round
+        to a pixel, the first."""
         found = np.full(self.pair.disparity.shape, np.nan)
         u, v = np.rint(points["pixel0"]).astype(int).T
         found[v, u] = self.pair.focal / points["position"][:, 2] - self.pair.offset

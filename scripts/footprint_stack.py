@@ -56,7 +56,8 @@ def kernels_of(source):
     file that names none, or lies outside the library, may call any kernel."""
     if not source.exists():
         return frozenset()
-    lists = [(SOURCES / "kernels" / name).read_text() for name in ("kernels.h", "odometry.h")]
+    lists = [(SOURCES / "kernels" / name).read_text()
+             for name in ("kernels.h", "odometry.h", "dense.h")]
     names = set(re.findall(r"X\((\w+), ", "".join(lists)))
     return frozenset(names & set(re.findall(r"(?:->|\.)(\w+)", source.read_text())))
 

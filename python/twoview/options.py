@@ -145,7 +145,7 @@ class DenseOptions:
     """The options of densify, as in tv_dense_options."""
 
     max_cells: int = 400000  #: most cells of the grid, [1024, 16777216]
-    max_steps: int = 128  #: most steps of parallax, [16, 512]
+    max_steps: int = 256  #: most steps of parallax, [16, 512]
     reserved: int = 0  #: must be 0
     min_parallax_rad: float = 0.0  #: least parallax, radians
     max_parallax_rad: float = 0.0  #: largest parallax, radians; 0: the range of the sparse points

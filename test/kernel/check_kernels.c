@@ -1,7 +1,8 @@
 /* Every kernel of every set that this machine runs, against the C set: the same bytes out of random
    and extreme data, odd sizes and misaligned pointers, and nothing written outside the outputs.
    Inputs are heap blocks of the exact size, so the address sanitizer sees a read beyond them.
-   The cases come from TVK_LIST and TVK_ODOMETRY_LIST: a kernel without a case does not compile.
+   The cases come from TVK_LIST, TVK_ODOMETRY_LIST and TVK_DENSE_LIST: a kernel without a case does
+   not compile.
 
    check_kernels          runs the checks
    check_kernels --time   prints nanoseconds per call of typical size, a column per set */
@@ -14,18 +15,25 @@
 #include <time.h>
 #include <unity.h>
 
+#include "kernels/dense.h"
 #include "kernels/odometry.h"
 #include "support/random.h"
 #include "twoview/context.h"
 #include "twoview/triangulate.h"
 
 #if defined(TWOVIEW_HAS_ODOMETRY)
-#define ALL_KERNELS(X) TVK_LIST(X) TVK_ODOMETRY_LIST(X)
+#define ODOMETRY_KERNELS(X) TVK_ODOMETRY_LIST(X)
 #else
-#define ALL_KERNELS(X) TVK_LIST(X)
+#define ODOMETRY_KERNELS(X)
 #endif
+#if defined(TWOVIEW_HAS_DENSE)
+#define DENSE_KERNELS(X) TVK_DENSE_LIST(X)
+#else
+#define DENSE_KERNELS(X)
+#endif
+#define ALL_KERNELS(X) TVK_LIST(X) ODOMETRY_KERNELS(X) DENSE_KERNELS(X)
 
-enum { MAX_BLOCKS = 32, GUARD_BYTES = 64, PATTERN = 0xA5, ROUNDS = 600 };
+enum { MAX_BLOCKS = 40, GUARD_BYTES = 64, PATTERN = 0xA5, ROUNDS = 600 };
 
 typedef struct block {
   uint8_t *memory, *data;
@@ -771,6 +779,213 @@ static void case_add_observation(trial *t) {
   for (k = 0; k < 6 * num_blocks; ++k) diagonal[k] = 2 * random_unit(&t->seed) - 1;
   REPEAT(t, tvk_odometry_of(t->set)->add_observation(observation, R, linear, sums, &system, idx,
                                                      columns, pitch));
+}
+#endif
+
+#if defined(TWOVIEW_HAS_DENSE)
+enum { DENSE_FRAME = 2 * TVK_DENSE_BLOCK };
+
+/* Random bytes, some of them 0 and some stretches equal, with a frame before and behind; returns
+   where the frame ends. */
+static uint8_t *dense_bytes(trial *t, int32_t count, int32_t most) {
+  uint8_t *bytes = INPUT(t, uint8_t, count + 2 * DENSE_FRAME);
+  const int kind = random_int(&t->seed, 0, 3);
+  int32_t k;
+  for (k = 0; k < count + 2 * DENSE_FRAME; ++k) {
+    const int32_t value = random_int(&t->seed, 0, most);
+    bytes[k] = (uint8_t)(kind == 0                                      ? value
+                         : kind == 1 && k > 0                           ? bytes[k - 1]
+                         : kind == 2 && random_int(&t->seed, 0, 9) == 0 ? 0
+                                                                        : most / 2 + value % 8);
+  }
+  return bytes + DENSE_FRAME;
+}
+
+static void case_census_codes(trial *t) {
+  const int32_t width = pick(t, 5, 200, 640), tolerance = random_int(&t->seed, 0, 40);
+  uint8_t *brighter = OUTPUT(t, uint8_t, width + TVK_DENSE_BLOCK);
+  uint8_t *darker = OUTPUT(t, uint8_t, width + TVK_DENSE_BLOCK);
+  const uint8_t *rows[5];
+  int k;
+  for (k = 0; k < 5; ++k) rows[k] = dense_bytes(t, width, 255);
+  REPEAT(t, tvk_dense_of(t->set)->census_codes(rows, width, tolerance, brighter, darker));
+}
+
+static void case_edge_costs(trial *t) {
+  const int32_t width = pick(t, 1, 200, 640);
+  const uint8_t *row = dense_bytes(t, width, 255), *above = dense_bytes(t, width, 255);
+  uint8_t *large = OUTPUT(t, uint8_t, width + TVK_DENSE_BLOCK);
+  uint8_t *across = OUTPUT(t, uint8_t, width + TVK_DENSE_BLOCK);
+  REPEAT(t, tvk_dense_of(t->set)->edge_costs(row, above, width, large, across));
+}
+
+/* A row whose arrays are filled as the kernels before would: `stage` of them have run. */
+static tvk_dense_row dense_row(trial *t, int stage) {
+  tvk_dense_row row;
+  const int32_t count = TVK_DENSE_BLOCK * pick(t, 1, 3, 2), pitch = count + 2 * TVK_DENSE_PAD;
+  uint8_t *before, *large, *across;
+  int32_t x, k;
+  memset(&row, 0, sizeof row);
+  row.width = pick(t, 1, 60, 640);
+  row.num_steps = count;
+  row.brighter0 = dense_bytes(t, row.width, 255);
+  row.darker0 = dense_bytes(t, row.width, 255);
+  row.brighter1 = dense_bytes(t, row.width + count, 255);
+  row.darker1 = dense_bytes(t, row.width + count, 255);
+  row.grey0 = dense_bytes(t, row.width, 255);
+  row.large = large = dense_bytes(t, row.width, 255);
+  row.across = across = dense_bytes(t, row.width, 255);
+  row.before = before = dense_bytes(t, row.width * pitch, 48);
+  row.costs =
+      stage < 1 ? OUTPUT(t, uint8_t, row.width * count) : dense_bytes(t, row.width * count, 16);
+  row.sums =
+      stage < 2 ? OUTPUT(t, uint8_t, row.width * count) : dense_bytes(t, row.width * count, 144);
+  row.after = OUTPUT(t, uint8_t, row.width * pitch);
+  row.least = OUTPUT(t, uint8_t, row.width);
+  row.ends = OUTPUT(t, uint8_t, 4 * pitch);
+  for (k = 0; stage == 1 && k < row.width * count; ++k) {
+    row.sums[k] = (uint8_t)random_int(&t->seed, 0, 48);
+  }
+  for (x = 0; x < row.width; ++x) {
+    large[x] = (uint8_t)(TVK_DENSE_SMALL + large[x] % (TVK_DENSE_LARGE - TVK_DENSE_SMALL + 1));
+    across[x] = (uint8_t)(TVK_DENSE_SMALL + across[x] % (TVK_DENSE_LARGE - TVK_DENSE_SMALL + 1));
+    memset(before + x * pitch, TVK_DENSE_NEVER, TVK_DENSE_PAD);
+    memset(before + x * pitch + TVK_DENSE_PAD + count, TVK_DENSE_NEVER, TVK_DENSE_PAD);
+    row.least[x] = 255;
+    for (k = 0; k < count; ++k) {
+      const uint8_t value = before[x * pitch + TVK_DENSE_PAD + k];
+      if (value < row.least[x]) row.least[x] = value;
+    }
+  }
+  return row;
+}
+
+static void case_sum_down(trial *t) {
+  const tvk_dense_row row = dense_row(t, 0);
+  REPEAT(t, tvk_dense_of(t->set)->sum_down(&row));
+}
+
+static void case_sum_across(trial *t) {
+  const tvk_dense_row row = dense_row(t, 1);
+  REPEAT(t, tvk_dense_of(t->set)->sum_across(&row));
+}
+
+static void case_choose_steps(trial *t) {
+  const tvk_dense_row row = dense_row(t, 2);
+  int16_t *steps = OUTPUT(t, int16_t, row.width);
+  uint8_t *least = OUTPUT(t, uint8_t, row.width), *margin = OUTPUT(t, uint8_t, row.width);
+  uint8_t *least1 = OUTPUT(t, uint8_t, row.width + row.num_steps - 1);
+  REPEAT(t, tvk_dense_of(t->set)->choose_steps(&row, steps, least, margin, least1));
+}
+
+/* Whole blocks that hold `width` and the frame of a window. */
+static int32_t dense_pitch(int32_t width) {
+  return (width + 2 * TVK_DENSE_REACH + TVK_DENSE_SPAN - 1) / TVK_DENSE_SPAN * TVK_DENSE_SPAN;
+}
+
+static void case_support_row(trial *t) {
+  const int32_t width = pick(t, 1, 100, 640), pitch = dense_pitch(width);
+  const int16_t *rows[7];
+  const int32_t spread = random_int(&t->seed, 1, 6);
+  uint8_t *support = OUTPUT(t, uint8_t, pitch), *alike = OUTPUT(t, uint8_t, pitch);
+  int8_t *slant = OUTPUT(t, int8_t, pitch);
+  int32_t n, k;
+  for (n = 0; n < 7; ++n) {
+    int16_t *row = INPUT(t, int16_t, width + 2 * TVK_DENSE_REACH + TVK_DENSE_SPAN);
+    for (k = 0; k < width + 2 * TVK_DENSE_REACH + TVK_DENSE_SPAN; ++k) {
+      row[k] =
+          (int16_t)(random_int(&t->seed, 0, 9) == 0 ? -1 : 500 + random_int(&t->seed, 0, spread));
+    }
+    rows[n] = row;
+  }
+  REPEAT(t, tvk_dense_of(t->set)->support_row(rows, width, support, alike, slant));
+}
+
+static void case_cell_sums(trial *t) {
+  const int32_t pitch = dense_pitch(pick(t, 1, 100, 640)), first = random_int(&t->seed, 0, 1);
+  const int32_t num_columns = TVK_DENSE_SUMS * (pitch + TVK_DENSE_SPAN);
+  int32_t *columns = OUTPUT(t, int32_t, num_columns);
+  int32_t *sums = OUTPUT(t, int32_t, TVK_DENSE_SUMS * pitch), n, k;
+  tvk_dense_rows rows;
+  for (n = 0; n < 2 * TVK_DENSE_REACH + 2; ++n) {
+    int16_t *g = INPUT(t, int16_t, pitch);
+    rows.a[n] = dense_bytes(t, pitch, 255);
+    rows.b[n] = dense_bytes(t, pitch, 255);
+    rows.is_cell[n] = dense_bytes(t, pitch, 1);
+    rows.g[n] = g;
+    for (k = 0; k < pitch; ++k) g[k] = (int16_t)random_int(&t->seed, -510, 510);
+  }
+  for (k = 0; k < num_columns; ++k) columns[k] = random_int(&t->seed, 0, 1000000);
+  REPEAT(t, tvk_dense_of(t->set)->cell_sums(&rows, pitch, first, columns, sums));
+}
+
+static void case_fit_row(trial *t) {
+  const int32_t pitch = dense_pitch(pick(t, 1, 60, 640));
+  int32_t *sums = INPUT(t, int32_t, TVK_DENSE_SUMS * pitch), x, k;
+  int16_t *steps = INPUT(t, int16_t, pitch);
+  uint8_t *alike = INPUT(t, uint8_t, pitch), *similarity = OUTPUT(t, uint8_t, pitch);
+  int8_t *slant = INPUT(t, int8_t, pitch);
+  float *parallax = OUTPUT(t, float, pitch), *sigma = OUTPUT(t, float, pitch);
+  const tvk_dense_model model = {2.0f, 4.0f, 0.1f, 8.0f, 0.0144f};
+  memset(sums, 0, (size_t)(TVK_DENSE_SUMS * pitch) * sizeof *sums);
+  for (x = 0; x < pitch; ++x) {
+    const int32_t num = random_int(&t->seed, 0, 49), contrast = random_int(&t->seed, 0, 127);
+    int32_t *s = sums + x;
+    for (k = 0; k < num; ++k) {
+      const int32_t a = 128 + random_int(&t->seed, -contrast, contrast);
+      const int32_t b = random_int(&t->seed, 0, 3) == 0 ? random_int(&t->seed, 0, 255) : a;
+      const int32_t g = random_int(&t->seed, -2 * contrast, 2 * contrast);
+      const int32_t terms[TVK_DENSE_SUMS] = {a, b, g, a * a, b * b, g * g, a * b, a * g, b * g, 1};
+      int n;
+      for (n = 0; n < TVK_DENSE_SUMS; ++n) s[n * pitch] += terms[n];
+    }
+    steps[x] = (int16_t)random_int(&t->seed, -1, 511);
+    alike[x] = (uint8_t)random_int(&t->seed, 0, 49);
+    slant[x] = (int8_t)random_int(&t->seed, -alike[x], alike[x]);
+  }
+  REPEAT(t, tvk_dense_of(t->set)->fit_row(sums, steps, alike, slant, pitch, &model, parallax, sigma,
+                                          similarity));
+  for (x = 0; x < pitch; ++x) {
+    TEST_ASSERT_TRUE(parallax[x] >= steps[x] - 2.001f && parallax[x] <= steps[x] + 2.001f);
+    TEST_ASSERT_TRUE(sigma[x] > 0 && sigma[x] < 1 && similarity[x] > 0);
+  }
+}
+
+static void case_smooth_row(trial *t) {
+  const int32_t width = pick(t, 1, 200, 640);
+  uint8_t *out = OUTPUT(t, uint8_t, width + TVK_DENSE_SPAN);
+  const uint8_t *rows[3];
+  int k;
+  for (k = 0; k < 3; ++k) rows[k] = dense_bytes(t, width, 255);
+  REPEAT(t, tvk_dense_of(t->set)->smooth_row(rows, width, out));
+}
+
+static void case_place_span(trial *t) {
+  const int32_t width = pick(t, 1, 300, 640), height = pick(t, 1, 300, 480);
+  tvk_dense_span *span = INPUT(t, tvk_dense_span, 1);
+  int32_t *u = OUTPUT(t, int32_t, TVK_DENSE_NODES), *v = OUTPUT(t, int32_t, TVK_DENSE_NODES);
+  int k;
+  memset(span, 0, sizeof *span);
+  for (k = 0; k < 4; ++k) {
+    const double size = k == 0 ? 300 : k == 1 ? 1 : k == 2 ? 0.01 : 1e-4;
+    span->u[k] = size * (2 * random_unit(&t->seed) - 0.5);
+    span->v[k] = size * (2 * random_unit(&t->seed) - 0.5);
+  }
+  REPEAT(t, tvk_dense_of(t->set)->place_span(span, random_int(&t->seed, 0, 1) ? 1 : 0.5, width,
+                                             height, u, v));
+}
+
+static void case_sample_span(trial *t) {
+  const int32_t width = pick(t, 1, 40, 640), height = pick(t, 1, 40, 480);
+  const int32_t count = pick(t, 1, TVK_DENSE_NODES, TVK_DENSE_NODES);
+  uint8_t *image = INPUT(t, uint8_t, width * height), *out = OUTPUT(t, uint8_t, count);
+  int32_t *u = INPUT(t, int32_t, count), *v = INPUT(t, int32_t, count), k;
+  for (k = 0; k < width * height; ++k) image[k] = (uint8_t)random_int(&t->seed, 0, 255);
+  for (k = 0; k < count; ++k) {
+    u[k] = random_int(&t->seed, 0, 9) == 0 ? -1 : random_int(&t->seed, 0, (width - 1) << 16);
+    v[k] = random_int(&t->seed, 0, (height - 1) << 16);
+  }
+  REPEAT(t, tvk_dense_of(t->set)->sample_span(image, width, height, width, u, v, count, out));
 }
 #endif
 

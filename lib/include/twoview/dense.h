@@ -29,8 +29,8 @@ typedef struct tv_dense_options {
      at the image's centre, or larger where the grid would have more cells. Time and memory grow in
      proportion. */
   int32_t max_cells;
-  /* The most steps of parallax that are compared for a cell, [16, 512], default 128, rounded down
-     to a multiple of 8. A step is as wide as a cell; where the range of parallax has more steps,
+  /* The most steps of parallax that are compared for a cell, [16, 512], default 256, rounded up
+     to a multiple of 32. A step is as wide as a cell; where the range of parallax has more steps,
      all cells are larger. Time and memory grow in proportion. */
   int32_t max_steps;
   /* Must be 0. */
@@ -58,7 +58,9 @@ typedef struct tv_dense_point {
   /* The standard deviation of the distance from camera 0, in the unit of t, that the noise of the
      matching causes. The error of the pose is not part of it. */
   float sigma;
-  /* How alike the windows around both pixels are: their correlation, in (0, 1]. */
+  /* How alike the windows around both pixels are: their correlation, in (0, 1]. It is near 1
+     where neither has texture: the parallax is then what the surroundings have, with a larger
+     sigma. */
   float similarity;
   /* Image 0 at the nearest pixel, [0, 255]. */
   int32_t grey;
@@ -66,7 +68,7 @@ typedef struct tv_dense_point {
 
 /* Writes to *size_bytes how much memory tv_densify needs for images of these sizes (width and
    height of each camera). options: null means the defaults. The number depends on the sizes, on the
-   options and on the library's version alone: about 9 MB for the defaults and images of 640 x 480.
+   options and on the library's version alone: about 7 MB for the defaults and images of 640 x 480.
    Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (an option), TV_ERR_NOT_FINITE (an
    option), TV_ERR_CAMERA. */
 TV_API tv_status tv_dense_size(const tv_camera *camera0, const tv_camera *camera1,
@@ -87,14 +89,13 @@ TV_API tv_status tv_dense_size(const tv_camera *camera0, const tv_camera *camera
    that are returned are spread evenly over them. The order is along the epipolar planes. Points and
    num_points overlap nothing else (TV_ERR_OVERLAP).
    A cell gives no point where the images do not overlap, where the winner of the matching is at an
-   end of the range, is not that of the opposite direction (from image 1 to image 0) or has few
-   neighbours of like parallax, where the windows are not alike, or where the standard deviation is
-   above max_relative_sigma.
-   The result has the same bits on every CPU. Takes at most max_cells x max_steps steps; 0.4 s for
-   the defaults on a desktop core. Needs no context. Thread-safe.
-   Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (an option, a count, an image, R or t),
-   TV_ERR_NOT_FINITE (an option, R or t), TV_ERR_CAMERA, TV_ERR_ALIGNMENT, TV_ERR_MEMORY,
-   TV_ERR_OVERLAP. */
+   end of the range, is hardly better than another step, is not that of the opposite direction (from
+   image 1 to image 0) or has few neighbours of like parallax, where the windows are not alike, or
+   where the standard deviation is above max_relative_sigma. The result has the same bits on every
+   CPU. Takes at most max_cells x max_steps steps; about 0.05 s for 370 000 cells and 96 steps on a
+   desktop core. Needs no context. Thread-safe. Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE,
+   TV_ERR_ARGUMENT (an option, a count, an image, R or t), TV_ERR_NOT_FINITE (an option, R or t),
+   TV_ERR_CAMERA, TV_ERR_ALIGNMENT, TV_ERR_MEMORY, TV_ERR_OVERLAP. */
 TV_API tv_status tv_densify(const tv_image *image0, const tv_image *image1,
                             const tv_camera *camera0, const tv_camera *camera1, const double R[9],
                             const double t[3], const tv_point *sparse, int32_t num_sparse,

@@ -1,65 +1,125 @@
 #include "dense/fraction.h"
 
-#include <cmath>
+#include <cstring>
 
 namespace tv {
 namespace {
 
-constexpr int32_t kReach = 3, kSide = 2 * kReach + 1, kSamples = kSide * kSide;
-constexpr double kLeastContrast = 4.0;  // variance of a window, squared grey levels
-constexpr double kLeastSimilarity = 0.7;
-constexpr double kMostChange = 1.0;
-// The standard deviation is multiplied by kExcess, since residuals of neighbouring pixels are
-// correlated, and has a floor that stands for what the model leaves out (measured:
+constexpr int32_t kReach = TVK_DENSE_REACH, kRows = 2 * kReach + 2;
+// Of a window of 5 x 5 cells, those that have the step of the middle to within one.
+constexpr int32_t kLeastSupport = 14;
+// Windows that are less alike than this show different things: a correlation of 0.7.
+constexpr uint8_t kLeastSimilarity = 179;
+// The variance of the residuals is multiplied by 4, since residuals of neighbouring pixels are
+// correlated; without texture the mean step of the neighbours has a standard deviation of 0.35
+// steps; and a floor of 0.12 steps stands for what the model leaves out (measured:
 // docs/decisions/0027-dense.md).
-constexpr double kExcess = 2.0, kFloor = 0.12;
+constexpr tvk_dense_model kModel = {8.0f, 4.0f, 0.1f, 8.0f, 0.12f * 0.12f};
+
+// A ring of rows of cells, each with a frame of kReach cells at both ends.
+struct Ring {
+  uint8_t* a;
+  uint8_t* b;
+  uint8_t* is_cell;
+  int16_t* g;
+  size_t pitch;
+
+  size_t at(int32_t y) const { return static_cast<size_t>((y + 2 * kRows) % kRows) * pitch; }
+};
+
+// A row and its frame, in whole blocks.
+size_t pitch_of(int32_t width) {
+  return (static_cast<size_t>(width) + 2 * kReach + TVK_DENSE_SPAN - 1) / TVK_DENSE_SPAN *
+         TVK_DENSE_SPAN;
+}
+
+// Writes row y of the ring: image 0, image 1 moved by the steps, and their slopes.
+void fill_row(const RowPair& rows, const Steps& steps, int32_t y, const Ring& ring) {
+  const size_t at = ring.at(y);
+  std::memset(ring.a + at, 0, ring.pitch);
+  std::memset(ring.b + at, 0, ring.pitch);
+  std::memset(ring.is_cell + at, 0, ring.pitch);
+  std::memset(ring.g + at, 0, ring.pitch * sizeof(int16_t));
+  if (y < 0 || y >= rows.height) return;
+  const int16_t* const found = steps.row(y);
+  const uint8_t *const row0 = rows.row0(y), *const row1 = rows.row1(y);
+  const int32_t last1 = rows.columns1() - 1;
+  constexpr int32_t kRim = TVK_DENSE_CENSUS_REACH;
+  for (int32_t x = kRim; x < rows.width - kRim; ++x) {
+    const int32_t x1 = x + found[x];
+    if (found[x] < 0 || x1 < kRim || x1 > last1 - kRim) continue;
+    const uint8_t *p = row0 + x, *q = row1 + x1;
+    // Beside the rim of an image the codes of its pixels are not whole.
+    if (p[-kRim] == 0 || p[kRim] == 0 || q[-kRim] == 0 || q[kRim] == 0) continue;
+    const size_t i = at + static_cast<size_t>(x + kReach);
+    ring.a[i] = p[0];
+    ring.b[i] = q[0];
+    ring.is_cell[i] = 1;
+    ring.g[i] = static_cast<int16_t>(p[1] - p[-1] + q[1] - q[-1]);
+  }
+}
 
 }  // namespace
 
-bool refine_step(const RowPair& rows, int32_t x, int32_t y, int32_t step, Refined* refined) {
-  const int32_t width1 = rows.width + rows.num_steps - 1;
-  if (x <= kReach || y < kReach || x + kReach + 1 >= rows.width || y + kReach >= rows.height)
-    return false;
-  const int32_t x1 = x + step;
-  if (x1 <= kReach || x1 + kReach + 1 >= width1) return false;
-  // Sums over the window: a of image 0, b of image 1, g their mean slope along the row, times 4.
-  int32_t sum_a = 0, sum_b = 0, sum_g = 0, aa = 0, bb = 0, gg = 0, ab = 0, ag = 0, bg = 0;
-  for (int32_t v = -kReach; v <= kReach; ++v) {
-    const uint8_t* p = rows.pixels0 + static_cast<ptrdiff_t>(y + v) * rows.width + x;
-    const uint8_t* q = rows.pixels1 + static_cast<ptrdiff_t>(y + v) * width1 + x1;
-    for (int32_t u = -kReach - 1; u <= kReach + 1; ++u)
-      if (p[u] == 0 || q[u] == 0) return false;
-    for (int32_t u = -kReach; u <= kReach; ++u) {
-      const int32_t a = p[u], b = q[u], g = p[u + 1] - p[u - 1] + q[u + 1] - q[u - 1];
-      sum_a += a, sum_b += b, sum_g += g;
-      aa += a * a, bb += b * b, gg += g * g, ab += a * b, ag += a * g, bg += b * g;
+size_t refine_rows_bytes(int32_t width) {
+  const size_t pitch = pitch_of(width);
+  return 3 * arena_bytes<uint8_t>(kRows * pitch) + arena_bytes<int16_t>(kRows * pitch) +
+         arena_bytes<int32_t>(TVK_DENSE_SUMS * (pitch + TVK_DENSE_SPAN)) +
+         arena_bytes<int32_t>(TVK_DENSE_SUMS * pitch) + 2 * arena_bytes<uint8_t>(pitch) +
+         arena_bytes<int8_t>(pitch);
+}
+
+size_t cells_entries(size_t cells) { return cells + 2 * (TVK_DENSE_SPAN + kReach); }
+
+void refine_rows(const RowPair& rows, const Steps& steps, const tvk_dense_table& kernels,
+                 Arena& arena, const DenseCells& cells) {
+  const ArenaScope scope(arena);
+  const int32_t width = rows.width;
+  const size_t pitch = pitch_of(width);
+  Ring ring;
+  ring.pitch = pitch;
+  ring.a = arena_alloc<uint8_t>(arena, kRows * pitch);
+  ring.b = arena_alloc<uint8_t>(arena, kRows * pitch);
+  ring.is_cell = arena_alloc<uint8_t>(arena, kRows * pitch);
+  ring.g = arena_alloc<int16_t>(arena, kRows * pitch);
+  int32_t* const columns = arena_alloc<int32_t>(arena, TVK_DENSE_SUMS * (pitch + TVK_DENSE_SPAN));
+  int32_t* const sums = arena_alloc<int32_t>(arena, TVK_DENSE_SUMS * pitch);
+  uint8_t* const support = arena_alloc<uint8_t>(arena, pitch);
+  uint8_t* const alike = arena_alloc<uint8_t>(arena, pitch);
+  int8_t* const slant = arena_alloc<int8_t>(arena, pitch);
+  // The entries behind a row's width, which kernels read too.
+  std::memset(alike, 0, pitch);
+  std::memset(slant, 0, pitch);
+  for (int32_t y = -kReach; y < kReach; ++y) fill_row(rows, steps, y, ring);
+  for (int32_t y = 0; y < rows.height; ++y) {
+    fill_row(rows, steps, y + kReach, ring);
+    tvk_dense_rows window;
+    const int16_t* around[2 * kReach + 1];
+    for (int32_t v = 0; v < kRows; ++v) {
+      // The last is the row that the window left, which is kReach + 1 above.
+      const size_t at = ring.at(v == kRows - 1 ? y - kReach - 1 : y - kReach + v);
+      window.a[v] = ring.a + at;
+      window.b[v] = ring.b + at;
+      window.g[v] = ring.g + at;
+      window.is_cell[v] = ring.is_cell + at;
+      if (v < kRows - 1) around[v] = steps.row(y - kReach + v) - kReach;
+    }
+    float* const parallax = cells.parallax + static_cast<ptrdiff_t>(y) * width;
+    float* const sigma = cells.sigma + static_cast<ptrdiff_t>(y) * width;
+    uint8_t* const similarity = cells.similarity + static_cast<ptrdiff_t>(y) * width;
+    kernels.support_row(around, width, support, alike, slant);
+    kernels.cell_sums(&window, static_cast<int32_t>(pitch), y == 0, columns, sums);
+    kernels.fit_row(sums, steps.row(y), alike, slant, static_cast<int32_t>(pitch), &kModel,
+                    parallax, sigma, similarity);
+    const int16_t* const found = steps.row(y);
+    const uint8_t* const is_cell = ring.is_cell + ring.at(y) + kReach;
+    for (int32_t x = 0; x < width; ++x) {
+      if (found[x] < 0 || is_cell[x] == 0 || support[x] < kLeastSupport ||
+          similarity[x] < kLeastSimilarity) {
+        parallax[x] = -1;
+      }
     }
   }
-  const double n = kSamples;
-  const auto centred = [&](int32_t product, int32_t s, int32_t r) {
-    return static_cast<double>(product) - static_cast<double>(s) * static_cast<double>(r) / n;
-  };
-  const double caa = centred(aa, sum_a, sum_a), cbb = centred(bb, sum_b, sum_b);
-  const double cgg = centred(gg, sum_g, sum_g) / 16, cab = centred(ab, sum_a, sum_b);
-  const double cag = centred(ag, sum_a, sum_g) / 4, cbg = centred(bg, sum_b, sum_g) / 4;
-  if (!(caa > kLeastContrast * n && cbb > kLeastContrast * n && cab > 0)) return false;
-  // b + change g = gain a + offset, by least squares over change, gain and offset.
-  const double pivot = cgg - cag * cag / caa;
-  if (!(pivot > 0.05 * cgg && pivot > n * 0.5)) return false;
-  const double change = (cab * cag / caa - cbg) / pivot;
-  if (!(change >= -kMostChange && change <= kMostChange)) return false;
-  const double gain = (cab + change * cag) / caa;
-  if (!(gain > 0.2 && gain < 5)) return false;
-  // What remains of image 1 after the change, and of it without image 0.
-  const double moved = cbb + 2 * change * cbg + change * change * cgg;
-  const double rest = moved - gain * gain * caa;
-  const double alike = gain * std::sqrt(caa / moved);
-  if (!(alike >= kLeastSimilarity)) return false;
-  const double noise = (rest > 0 ? rest : 0) / (n - 3) + 0.1;
-  refined->step = step + change;
-  refined->sigma = std::sqrt(kExcess * kExcess * noise / pivot + kFloor * kFloor);
-  refined->similarity = alike < 1 ? alike : 1;
-  return true;
 }
 
 }  // namespace tv

@@ -2,19 +2,28 @@
 // deviation, and how alike the windows are. docs/algorithms/dense.md.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 #include "dense/sweep.h"
 
 namespace tv {
 
-struct Refined {
-  double step, sigma;  // in steps of parallax
-  double similarity;   // correlation of the windows
+// The cells of a pair, row by row, width x height, in arrays of cells_entries.
+struct DenseCells {
+  float* parallax;      // in steps; below 0 where there is none
+  float* sigma;         // its standard deviation, in steps
+  uint8_t* similarity;  // the correlation of the windows, 1 .. 255
 };
 
-// Refines a step of match_rows. False where a window is not wholly inside, has too little texture,
-// is not alike, or moves by more than a step.
-bool refine_step(const RowPair& rows, int32_t x, int32_t y, int32_t step, Refined* refined);
+// Room for so many cells, and for what kernels write behind a row.
+size_t cells_entries(size_t cells);
+
+// Bytes of arena that refine_rows takes.
+size_t refine_rows_bytes(int32_t width);
+
+// Refines the steps that match_rows found, and leaves out those that few neighbours have.
+void refine_rows(const RowPair& rows, const Steps& steps, const tvk_dense_table& kernels,
+                 Arena& arena, const DenseCells& cells);
 
 }  // namespace tv

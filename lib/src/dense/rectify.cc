@@ -14,38 +14,50 @@ constexpr int32_t kSectors = 64;     // of the circle around the baseline
 constexpr int32_t kBins = 4096;      // of the histogram of parallax
 constexpr double kEpipoleSteps = 4;  // columns this near an epipole have no parallax to measure
 constexpr double kMargin = 1.3;      // of the range of parallax
+// A flat grid is chosen where no ray of image 0 is farther than this from its middle, as a tangent,
+// and no parallax larger, as an angle: cells at the rim then still resolve the image, and are not
+// many more than pixels.
+constexpr double kFlatReach = 1.25, kFlatParallax = 0.7;
+constexpr int32_t kSpan = TVK_DENSE_NODES;
 
 double angle_between_0_and_2pi(double angle) { return angle < 0 ? angle + 2 * kPi : angle; }
 
 int32_t columns_of(double extent, double step) { return static_cast<int32_t>(extent / step) + 1; }
 
-// The extent of image 0 in the grid's angles.
-struct Extent {
-  double first_plane, planes, least_angle, most_angle;
-};
-
-bool extent_of(const Camera& camera, const DenseGrid& grid, Arena& arena, Extent* extent) {
-  const ArenaScope scope(arena);
-  double* const planes = arena_alloc<double>(arena, kProbes * kProbes);
-  int32_t num = 0;
-  bool hit[kSectors] = {};
-  extent->least_angle = kPi;
-  extent->most_angle = 0;
+// Calls f with the ray of each probe of the image.
+template <typename F>
+void for_each_probe(const Camera& camera, const F& f) {
   for (int32_t j = 0; j < kProbes; ++j) {
     for (int32_t i = 0; i < kProbes; ++i) {
       const Vec2 pixel(static_cast<double>(i * (camera.model.width - 1)) / (kProbes - 1),
                        static_cast<double>(j * (camera.model.height - 1)) / (kProbes - 1));
       Vec3 ray;
-      if (!unproject(camera, pixel, &ray, nullptr)) continue;
-      const double x = dot(ray, grid.side), y = dot(ray, grid.up);
-      const double angle = atan2(std::sqrt(x * x + y * y), dot(ray, grid.baseline));
-      const double plane = angle_between_0_and_2pi(atan2(y, x));
-      planes[num++] = plane;
-      hit[static_cast<int32_t>(plane * (kSectors / (2 * kPi))) % kSectors] = true;
-      extent->least_angle = std::min(extent->least_angle, angle);
-      extent->most_angle = std::max(extent->most_angle, angle);
+      if (unproject(camera, pixel, &ray, nullptr)) f(ray);
     }
   }
+}
+
+// The extent of image 0 in rows and columns of the grid.
+struct Extent {
+  double first_row, rows, low, high;
+};
+
+bool angular_extent(const Camera& camera, const DenseGrid& grid, Arena& arena, Extent* extent) {
+  const ArenaScope scope(arena);
+  double* const planes = arena_alloc<double>(arena, kProbes * kProbes);
+  int32_t num = 0;
+  bool hit[kSectors] = {};
+  extent->low = kPi;
+  extent->high = 0;
+  for_each_probe(camera, [&](const Vec3& ray) {
+    const double x = dot(ray, grid.side), y = dot(ray, grid.up);
+    const double angle = atan2(std::sqrt(x * x + y * y), dot(ray, grid.baseline));
+    const double plane = angle_between_0_and_2pi(atan2(y, x));
+    planes[num++] = plane;
+    hit[static_cast<int32_t>(plane * (kSectors / (2 * kPi))) % kSectors] = true;
+    extent->low = std::min(extent->low, angle);
+    extent->high = std::max(extent->high, angle);
+  });
   if (num == 0) return false;
   // Planes are counted from the middle of the largest gap between them.
   int32_t gap = 0, gap_end = 0;
@@ -62,9 +74,113 @@ bool extent_of(const Camera& camera, const DenseGrid& grid, Arena& arena, Extent
     most = std::max(most, plane);
   }
   if (gap == 0) least = 0, most = 2 * kPi;
-  extent->first_plane = start + least;
-  extent->planes = most - least;
+  extent->first_row = start + least;
+  extent->rows = most - least;
   return true;
+}
+
+// Turns the grid's axes so that `side` is as near as can be to where both cameras look. Returns
+// false if image 0 is too wide for a flat grid.
+bool flat_extent(const Camera& camera, const Mat3& R, DenseGrid* grid, Extent* extent) {
+  const Vec3 axes(R(2, 0), R(2, 1), R(2, 2) + 1);
+  const double x = dot(axes, grid->side), y = dot(axes, grid->up);
+  const double size = std::sqrt(x * x + y * y);
+  if (!(size > 0.1)) return false;
+  DenseGrid turned = *grid;
+  turned.side = combine(x / size, grid->side, y / size, grid->up);
+  turned.up = combine(-y / size, grid->side, x / size, grid->up);
+  double last_row = -kFlatReach;
+  *extent = {kFlatReach, 0, kFlatReach, -kFlatReach};
+  bool is_flat = true, any = false;
+  for_each_probe(camera, [&](const Vec3& ray) {
+    const double ahead = dot(ray, turned.side);
+    const double c = -dot(ray, turned.baseline), v = dot(ray, turned.up), most = kFlatReach * ahead;
+    if (!(std::fabs(c) <= most && std::fabs(v) <= most)) {
+      is_flat = false;
+      return;
+    }
+    any = true;
+    extent->first_row = std::min(extent->first_row, v / ahead);
+    last_row = std::max(last_row, v / ahead);
+    extent->low = std::min(extent->low, c / ahead);
+    extent->high = std::max(extent->high, c / ahead);
+  });
+  extent->rows = last_row - extent->first_row;
+  if (is_flat && any) *grid = turned;
+  return is_flat && any;
+}
+
+// The parallax of a flat grid that belongs to an angle between the rays, for a ray of image 0; and
+// the angle itself for a grid of angles.
+double parallax_of(const DenseGrid& grid, const Vec3& ray, double angle) {
+  if (!grid.is_flat) return angle;
+  const double along = dot(ray, grid.baseline), ahead = dot(ray, grid.side);
+  const double across = dot(ray, grid.up);
+  const double size_sq = along * along + ahead * ahead + across * across;
+  double sine, cosine;
+  sincos(angle, &sine, &cosine);
+  // The ray of camera 1 is that of camera 0, turned by the angle away from the baseline.
+  const double turned = std::sqrt(ahead * ahead + across * across) * cosine + along * sine;
+  // A point without a position is taken for one in the middle.
+  if (!(size_sq > 0)) return cosine > 0 ? sine / cosine : -1;
+  return turned > 0 && ahead > 0 ? sine * size_sq / (turned * ahead) : -1;
+}
+
+struct ParallaxRange {
+  double least, most;
+};
+
+// The range of parallax of points of status TV_POINT_OK, in the unit of the grid's columns.
+bool range_of_points(const ParallaxHint& hint, const DenseGrid& grid, double pixel_angle,
+                     Arena& arena, ParallaxRange* range) {
+  const ArenaScope scope(arena);
+  int32_t* const bins = arena_alloc<int32_t>(arena, kBins);
+  for (int32_t k = 0; k < kBins; ++k) bins[k] = 0;
+  const double width = std::max(pixel_angle, kPi / (kBins - 1));
+  int32_t num = 0;
+  for (int32_t i = 0; i < hint.num_points; ++i) {
+    const tv_point& point = hint.points[i];
+    const double angle = static_cast<double>(point.angle_rad);
+    if (point.status != TV_POINT_OK || !(angle >= 0 && angle <= kPi)) continue;
+    const Vec3 ray(point.position[0], point.position[1], point.position[2]);
+    const double parallax = parallax_of(grid, ray, angle);
+    if (!(parallax >= 0 && parallax <= kPi)) continue;
+    ++bins[static_cast<int32_t>(parallax / width)];
+    ++num;
+  }
+  if (num == 0) return false;
+  const int32_t outermost = num / 100;
+  int32_t low = 0, high = kBins - 1;
+  for (int32_t sum = bins[low]; sum <= outermost; sum += bins[low]) ++low;
+  for (int32_t sum = bins[high]; sum <= outermost; sum += bins[high]) --high;
+  range->least = std::max(0.0, (low / kMargin - 1) * width);
+  range->most = std::min(kPi, ((high + 1) * kMargin + 1) * width);
+  return true;
+}
+
+// The range in the unit of the grid's columns. Returns false if a flat grid does not hold it.
+bool range_of(const ParallaxHint& hint, const Camera& camera0, const DenseGrid& grid,
+              double pixel_angle, int32_t max_steps, Arena& arena, ParallaxRange* range) {
+  *range = {0, (max_steps - 2) * pixel_angle};
+  bool is_held = true;
+  if (hint.most > 0) {
+    *range = {hint.least, hint.most};
+    if (grid.is_flat) {
+      is_held = hint.most <= kFlatParallax;
+      // At the middle an angle gives the least parallax, at the rim the most.
+      double sine, cosine;
+      sincos(std::min(hint.least, 1.0), &sine, &cosine);
+      *range = {sine, 0};
+      for_each_probe(camera0, [&](const Vec3& ray) {
+        const double parallax = parallax_of(grid, ray, hint.most);
+        is_held = is_held && parallax > 0;
+        range->most = std::max(range->most, parallax);
+      });
+    }
+  } else {
+    range_of_points(hint, grid, pixel_angle, arena, range);
+  }
+  return is_held && (!grid.is_flat || range->most <= kFlatReach);
 }
 
 // The angle in [low, high] that is nearest to a right one, where planes are farthest apart.
@@ -99,30 +215,7 @@ double pixel_angle_of(const Camera& camera0, const Camera& camera1) {
   return least;
 }
 
-bool range_of_points(const tv_point* points, int32_t num_points, double pixel_angle, Arena& arena,
-                     ParallaxRange* range) {
-  const ArenaScope scope(arena);
-  int32_t* const bins = arena_alloc<int32_t>(arena, kBins);
-  for (int32_t k = 0; k < kBins; ++k) bins[k] = 0;
-  const double width = std::max(pixel_angle, kPi / (kBins - 1));
-  int32_t num = 0;
-  for (int32_t i = 0; i < num_points; ++i) {
-    const double angle = static_cast<double>(points[i].angle_rad);
-    if (points[i].status != TV_POINT_OK || !(angle >= 0 && angle <= kPi)) continue;
-    ++bins[static_cast<int32_t>(angle / width)];
-    ++num;
-  }
-  if (num == 0) return false;
-  const int32_t outermost = num / 100;
-  int32_t low = 0, high = kBins - 1;
-  for (int32_t sum = bins[low]; sum <= outermost; sum += bins[low]) ++low;
-  for (int32_t sum = bins[high]; sum <= outermost; sum += bins[high]) --high;
-  range->least = std::max(0.0, (low / kMargin - 1) * width);
-  range->most = std::min(kPi, ((high + 1) * kMargin + 1) * width);
-  return true;
-}
-
-bool make_grid(const Camera& camera0, const Mat3& R, const Vec3& t, const ParallaxRange& range,
+bool make_grid(const Camera& camera0, const Mat3& R, const Vec3& t, const ParallaxHint& hint,
                double pixel_angle, int32_t max_cells, int32_t max_steps, Arena& arena,
                DenseGrid* grid) {
   Mat3 back;
@@ -139,43 +232,48 @@ bool make_grid(const Camera& camera0, const Mat3& R, const Vec3& t, const Parall
   for (int i = 0; i < 3; ++i) grid->baseline[i] /= norm;
   complete_basis(grid->baseline, &grid->side, &grid->up);
   Extent extent;
-  if (!extent_of(camera0, *grid, arena, &extent)) return false;
+  ParallaxRange range;
+  grid->is_flat = true;
+  if (!flat_extent(camera0, R, grid, &extent) ||
+      !range_of(hint, camera0, *grid, pixel_angle, max_steps, arena, &range)) {
+    grid->is_flat = false;
+    if (!angular_extent(camera0, *grid, arena, &extent)) return false;
+    range_of(hint, camera0, *grid, pixel_angle, max_steps, arena, &range);
+  }
   // The step: a pixel, or as many as keep the steps of parallax within their number, and then the
   // cells and the columns.
   double step = std::max(pixel_angle, (range.most - range.least) / (max_steps - 2));
-  double low = 0, high = 0, sine = 1;
+  double low = extent.low, high = extent.high, sine = 1;
   const double longest = longest_side(max_cells);
   for (int pass = 0; pass < 2; ++pass) {
-    low = std::max(extent.least_angle, kEpipoleSteps * step);
-    high = std::min(extent.most_angle, kPi - kEpipoleSteps * step);
-    if (!(low < high)) return false;
-    sine = widest_sine(low, high);
-    const double across = (high - low) / step + 1, down = extent.planes * sine / step + 1;
+    if (!grid->is_flat) {
+      low = std::max(extent.low, kEpipoleSteps * step);
+      high = std::min(extent.high, kPi - kEpipoleSteps * step);
+      if (!(low < high)) return false;
+      sine = widest_sine(low, high);
+    }
+    const double across = (high - low) / step + 1, down = extent.rows * sine / step + 1;
     if (pass == 0) {
       step *= std::max(1.0, std::max(std::sqrt(across * down / max_cells),
                                      std::max(across, down) / (longest - 1)));
     }
   }
   grid->step = step;
-  grid->first_angle = low;
-  grid->width = std::min(columns_of(high - low, step), static_cast<int32_t>(longest));
-  grid->plane_step = step / sine;
-  grid->first_plane = extent.first_plane;
-  grid->height =
-      std::min(std::min(columns_of(extent.planes, grid->plane_step), static_cast<int32_t>(longest)),
-               max_cells / grid->width);
+  grid->first_column = low;
+  // A hundredth of a cell is for rounding: the grid of rectified images is that of their pixels.
+  grid->width = std::min(columns_of(high - low + 0.01 * step, step), static_cast<int32_t>(longest));
+  grid->row_step = step / sine;
+  grid->first_row = extent.first_row;
+  grid->height = std::min(std::min(columns_of(extent.rows + 0.01 * step, grid->row_step),
+                                   static_cast<int32_t>(longest)),
+                          max_cells / grid->width);
   grid->first_step = static_cast<int32_t>(range.least / step);
   const int32_t last = static_cast<int32_t>(range.most / step) + 1;
-  grid->num_steps = std::min((last - grid->first_step + 8) / 8 * 8, max_steps);
+  constexpr int32_t kBlock = TVK_DENSE_BLOCK;
+  const int32_t blocks = std::min(last - grid->first_step + kBlock, max_steps + kBlock - 1);
+  grid->num_steps = blocks / kBlock * kBlock;
+  grid->range_steps = std::min(last - grid->first_step + 2, grid->num_steps);
   return grid->height > 0;
-}
-
-void tabulate(const DenseGrid& grid, int32_t first, int32_t count, double* sines) {
-  for (int32_t k = 0; k < count; ++k) {
-    const double angle = grid.first_angle + (first + k) * grid.step;
-    sincos(angle, sines + 2 * k, sines + 2 * k + 1);
-    if (!(angle <= kPi)) sines[2 * k] = -1;
-  }
 }
 
 void halve(const DenseGrid& grid, double pixel_angle, Arena& arena, DenseView* view) {
@@ -205,50 +303,109 @@ void halve(const DenseGrid& grid, double pixel_angle, Arena& arena, DenseView* v
   view->image = tv_image{to, width, height, width};
 }
 
-Vec3 ray_at(const DenseGrid& grid, int32_t row, double angle) {
-  double plane_sine, plane_cosine, sine, cosine;
-  sincos(grid.first_plane + row * grid.plane_step, &plane_sine, &plane_cosine);
+// ---- Track: the pixel along a row is smooth, so the lens model is asked at every kSpan-th column,
+// and a cubic through four of these nodes serves the columns between the middle two.
+
+namespace {
+
+int32_t spans_of(int32_t columns) { return (columns + kSpan - 1) / kSpan; }
+
+}  // namespace
+
+size_t track_bytes(int32_t columns) {
+  const size_t spans = static_cast<size_t>(spans_of(columns));
+  return arena_bytes<double>(2 * (spans + 3)) + arena_bytes<tvk_dense_span>(spans);
+}
+
+Track::Track(const DenseGrid& grid, const DenseView& view, double first, int32_t columns,
+             Arena& arena)
+    : grid_(grid), view_(view), first_(first), columns_(columns), num_spans_(spans_of(columns)) {
+  along_ = rotate(view.rotation, grid.baseline);
+  side_ = rotate(view.rotation, grid.side);
+  up_ = rotate(view.rotation, grid.up);
+  nodes_ = arena_alloc<double>(arena, 2 * (static_cast<size_t>(num_spans_) + 3));
+  spans_ = arena_alloc<tvk_dense_span>(arena, static_cast<size_t>(num_spans_));
+  if (grid.is_flat) return;
+  for (int32_t n = 0; n < num_spans_ + 3; ++n) {
+    const double angle = grid.column(first + (n - 1) * kSpan);
+    sincos(angle, nodes_ + 2 * n, nodes_ + 2 * n + 1);
+    if (!(angle >= 0 && angle <= kPi)) nodes_[2 * n] = -1;
+  }
+}
+
+bool Track::exact_at(double column, Vec2* pixel) const {
+  if (grid_.is_flat) {
+    return project(view_.camera, combine(-grid_.column(first_ + column), along_, 1, across_), pixel,
+                   nullptr);
+  }
+  const double angle = grid_.column(first_ + column);
+  if (!(angle >= 0 && angle <= kPi)) return false;
+  double sine, cosine;
   sincos(angle, &sine, &cosine);
-  return combine(cosine, grid.baseline, sine,
-                 combine(plane_cosine, grid.side, plane_sine, grid.up));
+  return project(view_.camera, combine(cosine, along_, sine, across_), pixel, nullptr);
 }
 
-bool pixel_at(const DenseView& view, const Vec3& ray, Vec2* pixel) {
-  if (!project(view.camera, rotate(view.rotation, ray), pixel, nullptr)) return false;
-  return (*pixel)[0] >= 0 && (*pixel)[1] >= 0 && (*pixel)[0] <= view.camera.model.width - 1 &&
-         (*pixel)[1] <= view.camera.model.height - 1;
-}
-
-void resample(const DenseGrid& grid, const DenseView& view, const double* sines, int32_t columns,
-              uint8_t* pixels) {
-  const tv_image& image = view.image;
-  const double scale = 1.0 / (1 << view.halvings);
-  const Vec3 along = rotate(view.rotation, grid.baseline);
-  for (int32_t y = 0; y < grid.height; ++y) {
-    double plane_sine, plane_cosine;
-    sincos(grid.first_plane + y * grid.plane_step, &plane_sine, &plane_cosine);
-    const Vec3 across =
-        rotate(view.rotation, combine(plane_cosine, grid.side, plane_sine, grid.up));
-    uint8_t* const row = pixels + static_cast<ptrdiff_t>(y) * columns;
-    for (int32_t x = 0; x < columns; ++x) {
-      row[x] = 0;
-      const double sine = sines[2 * x], cosine = sines[2 * x + 1];
-      if (sine < 0) continue;
-      Vec2 at;
-      if (!project(view.camera, combine(cosine, along, sine, across), &at, nullptr)) continue;
-      const double u = (at[0] + 0.5) * scale - 0.5, v = (at[1] + 0.5) * scale - 0.5;
-      if (!(u >= 0 && v >= 0 && u <= image.width - 1 && v <= image.height - 1)) continue;
-      const int32_t u16 = static_cast<int32_t>(u * 65536), v16 = static_cast<int32_t>(v * 65536);
-      const uint8_t* p =
-          image.data + static_cast<int64_t>(v16 >> 16) * image.stride_bytes + (u16 >> 16);
-      const ptrdiff_t right = (u16 >> 16) + 1 < image.width ? 1 : 0;
-      const uint8_t* q = (v16 >> 16) + 1 < image.height ? p + image.stride_bytes : p;
-      const int32_t du = u16 >> 8 & 255, dv = v16 >> 8 & 255;
-      const int32_t upper = 256 * p[0] + du * (p[right] - p[0]);
-      const int32_t lower = 256 * q[0] + du * (q[right] - q[0]);
-      const int32_t grey = (256 * upper + dv * (lower - upper) + 32768) >> 16;
-      row[x] = static_cast<uint8_t>(std::max(grey, 1));
+void Track::go_to_row(int32_t y) {
+  const double v = grid_.row(y);
+  if (grid_.is_flat) {
+    across_ = combine(1, side_, v, up_);
+  } else {
+    double sine, cosine;
+    sincos(v, &sine, &cosine);
+    across_ = combine(cosine, side_, sine, up_);
+  }
+  Vec2 at[4];
+  bool has[4] = {};
+  const double widest = 20000;  // the cubic is then an int32_t of 1/65536, too
+  for (int32_t n = -3; n < num_spans_; ++n) {
+    for (int i = 0; i < 3; ++i) at[i] = at[i + 1], has[i] = has[i + 1];
+    const int32_t node = n + 3;
+    if (grid_.is_flat) {
+      const double c = grid_.column(first_ + (node - 1) * kSpan);
+      has[3] = project(view_.camera, combine(-c, along_, 1, across_), &at[3], nullptr);
+    } else {
+      const double sine = nodes_[2 * node], cosine = nodes_[2 * node + 1];
+      has[3] = sine >= 0 &&
+               project(view_.camera, combine(cosine, along_, sine, across_), &at[3], nullptr);
     }
+    has[3] = has[3] && std::fabs(at[3][0]) < widest && std::fabs(at[3][1]) < widest;
+    if (n < 0) continue;
+    tvk_dense_span& span = spans_[n];
+    span.is_smooth = has[0] && has[1] && has[2] && has[3];
+    if (!span.is_smooth) continue;
+    for (int i = 0; i < 2; ++i) {
+      const double a = at[0][i], b = at[1][i], c = at[2][i], d = at[3][i];
+      double* p = i == 0 ? span.u : span.v;
+      p[0] = b;
+      p[1] = (c - a / 3 - b / 2 - d / 6) / kSpan;
+      p[2] = ((a + c) / 2 - b) / (kSpan * kSpan);
+      p[3] = ((d - a) / 6 + (b - c) / 2) / (kSpan * kSpan * kSpan);
+    }
+  }
+}
+
+void Track::sample(const tvk_dense_table& kernels, uint8_t* pixels) const {
+  const tv_image& image = view_.image;
+  const double scale = 1.0 / (1 << view_.halvings);
+  for (int32_t n = 0; n < num_spans_; ++n) {
+    const int32_t x = n * kSpan;
+    int32_t u[kSpan], v[kSpan];
+    if (spans_[n].is_smooth) {
+      kernels.place_span(&spans_[n], scale, image.width, image.height, u, v);
+    } else {
+      for (int32_t i = 0; i < kSpan; ++i) {
+        Vec2 at;
+        u[i] = -1;
+        if (!exact_at(x + i, &at)) continue;
+        const double column = (at[0] + 0.5) * scale - 0.5, row = (at[1] + 0.5) * scale - 0.5;
+        if (!(column >= 0 && row >= 0 && column <= image.width - 1 && row <= image.height - 1))
+          continue;
+        u[i] = static_cast<int32_t>(column * 65536);
+        v[i] = static_cast<int32_t>(row * 65536);
+      }
+    }
+    kernels.sample_span(image.data, image.width, image.height, image.stride_bytes, u, v,
+                        std::min(kSpan, columns_ - x), pixels + x);
   }
 }
 

@@ -1,12 +1,15 @@
-// The grid of epipolar planes and angles in which the two images' rows correspond, for any lens and
-// any motion. docs/algorithms/dense.md.
+// The grid of epipolar planes in which the two images' rows correspond, for any lens and any
+// motion. docs/algorithms/dense.md.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
 #include "base/arena.h"
 #include "geometry/camera.h"
+#include "kernels/dense.h"
 #include "twoview/dense.h"
 #include "twoview/image.h"
 
@@ -20,59 +23,96 @@ struct DenseView {
   int32_t halvings;
 };
 
-// A plane of the grid contains both camera centres. A row is such a plane, at the angle
-// first_plane + row * plane_step around the baseline; a column is the angle first_angle + column *
-// step between the ray and the direction from camera 0 to camera 1. The parallax of a point is the
-// difference of its angle in camera 1 and in camera 0, never below 0 in front of both.
+// A row of the grid is a plane that contains both camera centres, a column a direction in that
+// plane. A flat grid is that of two rectified images: the ray of row v and column c is -c baseline
+// + side + v up, and a point has a parallax in c of length / (its distance along `side`). Any other
+// grid is one of angles: v is the plane's angle around the baseline, c the angle between the ray
+// and the baseline, and the parallax is their difference.
 struct DenseGrid {
   Vec3 baseline, side, up;  // unit vectors in the frame of camera 0, orthogonal to each other
   double length;            // of the baseline
-  double first_plane, plane_step, first_angle, step;
+  bool is_flat;
+  double first_row, row_step, first_column, step;  // v = first_row + row * row_step; c likewise
   int32_t width, height;
-  int32_t first_step, num_steps;  // of parallax; num_steps is a multiple of 8
+  // Of parallax: num_steps is a multiple of TVK_DENSE_BLOCK, of which the range has the first
+  // range_steps.
+  int32_t first_step, num_steps, range_steps;
+
+  int32_t columns1() const { return width + num_steps - 1; }
+  double row(int32_t y) const { return first_row + y * row_step; }
+  double column(double x) const { return first_column + x * step; }
 };
 
-// Range of parallax in radians.
-struct ParallaxRange {
-  double least, most;
+// What is known of the range of parallax. With a `most` of 0 it is that of the points of status
+// TV_POINT_OK, without the outermost 1 % and with a margin; without such points it begins at 0.
+struct ParallaxHint {
+  double least, most;  // radians
+  const tv_point* points;
+  int32_t num_points;
 };
 
 // The most columns, and the most rows, of a grid of at most max_cells cells.
 int32_t longest_side(int32_t max_cells);
 
-// Bytes of arena that make_grid takes for itself, and those that halved images need.
+// The bytes of arena that make_grid takes for itself, those that halved images need, and those of
+// the Track of a row with so many columns.
 size_t make_grid_bytes();
 size_t halved_bytes(int32_t width, int32_t height);
-
-// The range of parallax that points of status TV_POINT_OK have, without the outermost 1 % and with
-// a margin. pixel_angle: the angle of a pixel. Returns false without such points.
-bool range_of_points(const tv_point* points, int32_t num_points, double pixel_angle, Arena& arena,
-                     ParallaxRange* range);
+size_t track_bytes(int32_t columns);
 
 // The angle of a pixel in the middle of the coarser of the two images.
 double pixel_angle_of(const Camera& camera0, const Camera& camera1);
 
-// Makes the grid that covers image 0. max_steps: a multiple of 8. Returns false where no ray of it
-// is valid.
-bool make_grid(const Camera& camera0, const Mat3& R, const Vec3& t, const ParallaxRange& range,
+// Makes the grid that covers image 0. Returns false where no ray of it is valid.
+bool make_grid(const Camera& camera0, const Mat3& R, const Vec3& t, const ParallaxHint& hint,
                double pixel_angle, int32_t max_cells, int32_t max_steps, Arena& arena,
                DenseGrid* grid);
 
 // Halves the view's image as often as the grid's cells are wide. The halved image is in the arena.
 void halve(const DenseGrid& grid, double pixel_angle, Arena& arena, DenseView* view);
 
-// Writes sine and cosine of the angles of `count` columns from the column `first` on, which may be
-// beyond the grid's width. The sine is -1 beyond the epipole.
-void tabulate(const DenseGrid& grid, int32_t first, int32_t count, double* sines);
+// Where a row of the grid lies in an image: pixels as polynomials over spans of columns.
+class Track {
+ public:
+  // A view's columns from `first` on, of which there are `columns`.
+  Track(const DenseGrid& grid, const DenseView& view, double first, int32_t columns, Arena& arena);
+  void go_to_row(int32_t y);
+  // Resamples the image along the row: 0 where the image has no pixel; other values are at least 1.
+  void sample(const tvk_dense_table& kernels, uint8_t* pixels) const;
+  // The pixel of the unhalved image at a column of [0, columns), which need not be whole. Returns
+  // false where the view does not see it. In the header, since it is done for every point.
+  bool pixel_at(double column, double* u, double* v) const {
+    const int32_t n = static_cast<int32_t>(column) / TVK_DENSE_NODES;
+    const tvk_dense_span& span = spans_[n];
+    if (span.is_smooth) {
+      const double s = column - n * TVK_DENSE_NODES;
+      *u = ((span.u[3] * s + span.u[2]) * s + span.u[1]) * s + span.u[0];
+      *v = ((span.v[3] * s + span.v[2]) * s + span.v[1]) * s + span.v[0];
+    } else {
+      Vec2 exact;
+      if (!exact_at(column, &exact)) return false;
+      *u = exact[0], *v = exact[1];
+    }
+    // What lies on the image's edge, or a fraction of a step beyond it, lies on the edge.
+    const double last_u = view_.camera.model.width - 1, last_v = view_.camera.model.height - 1;
+    const double inside_u = std::min(std::max(*u, 0.0), last_u);
+    const double inside_v = std::min(std::max(*v, 0.0), last_v);
+    const bool is_near = std::fabs(*u - inside_u) <= 0.5 && std::fabs(*v - inside_v) <= 0.5;
+    *u = inside_u, *v = inside_v;
+    return is_near;
+  }
 
-// Resamples an image at the columns that tabulate wrote. 0 where the image has no pixel; other
-// values are at least 1.
-void resample(const DenseGrid& grid, const DenseView& view, const double* sines, int32_t columns,
-              uint8_t* pixels);
+ private:
+  bool exact_at(double column, Vec2* pixel) const;
 
-// The ray at a row and an angle, in the frame of camera 0; the pixel of the unhalved image at which
-// a view sees it. pixel_at returns false where it sees it not.
-Vec3 ray_at(const DenseGrid& grid, int32_t row, double angle);
-bool pixel_at(const DenseView& view, const Vec3& ray, Vec2* pixel);
+  const DenseGrid& grid_;
+  const DenseView& view_;
+  Vec3 along_, side_, up_;  // the grid's axes in the view's frame
+  Vec3 across_;             // of the row: angles only
+  double first_;
+  int32_t columns_, num_spans_;
+  double* nodes_;  // sine and cosine of the nodes' angles, for a grid of angles
+  tvk_dense_span* spans_;
+};
 
 }  // namespace tv

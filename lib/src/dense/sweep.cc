@@ -1,181 +1,155 @@
-// The costs, the five paths and the choice of semi-global matching.
+// The codes, the three paths and the choice of semi-global matching.
 #include "dense/sweep.h"
 
 #include <algorithm>
-
-#include "dense/lines.h"
+#include <cstring>
 
 namespace tv {
 namespace {
 
-// Costs of a change of parallax along a path, by one step and by more; the latter is lower where
-// the image has an edge.
-constexpr int32_t kLeastLarge = 10, kLarge = 48, kEdge = 12;
-constexpr int16_t kOutside = 15;  // the cost of a pixel outside image 1: that of a chance match
-// The winner's cost is below this share of the cost of any step that is not its neighbour.
-constexpr int32_t kUnique = 97;
-constexpr int32_t kPad = 8;  // entries before and behind a line of costs
+// What differs in all steps but the winner's and its neighbours', at least, in units of a bit.
+constexpr int32_t kLeastMargin = 2;
+// A pixel is brighter than another if it is so by more than this, in grey levels.
+constexpr int32_t kLeastTolerance = 2;
+// The lower quartile of |noise operator| from which on images are smoothed first; 1.9 times the
+// standard deviation of a pixel (J. Immerkaer, CVIU 1996, with a quartile in place of the mean).
+constexpr int32_t kNoisy = 3;
+constexpr int32_t kNoiseBins = 64, kNoiseEvery = 8;  // rows
 
-// A line of costs of one pixel: num_steps entries with kPad entries of kNever on both sides.
-struct Lines {
-  int16_t* data;
-  ptrdiff_t stride;
-  int16_t* at(ptrdiff_t x) const { return data + x * stride + kPad; }
-};
+// The bytes of an array of a row: kernels write whole blocks.
+size_t row_bytes(int32_t columns) { return static_cast<size_t>(columns) + 2 * TVK_DENSE_BLOCK; }
 
-ptrdiff_t stride_of(int32_t num_steps) { return num_steps + 2 * kPad; }
-
-size_t lines_bytes(int32_t width, int32_t num_steps) {
-  return arena_bytes<int16_t>(static_cast<size_t>(width) *
-                              static_cast<size_t>(stride_of(num_steps)));
-}
-
-Lines make_lines(int32_t width, int32_t num_steps, Arena& arena) {
-  const size_t count = static_cast<size_t>(width) * static_cast<size_t>(stride_of(num_steps));
-  Lines lines{arena_alloc<int16_t>(arena, count), stride_of(num_steps)};
-  for (int32_t x = 0; x < width; ++x) {
-    int16_t* line = lines.at(x) - kPad;
-    for (ptrdiff_t k = 0; k < lines.stride; ++k) line[k] = kNever;
-    for (ptrdiff_t k = kPad; k < lines.stride - kPad; ++k) line[k] = 0;
+// The lower quartile, over every kNoiseEvery-th row, of |(1 -2 1)' (1 -2 1)| over 3 x 3 pixels.
+int32_t noise_of(const uint8_t* pixels, int32_t width, int32_t height) {
+  int32_t bins[kNoiseBins] = {}, total = 0;
+  for (int32_t y = 1; y < height - 1; y += kNoiseEvery) {
+    const uint8_t* p = pixels + static_cast<ptrdiff_t>(y) * width;
+    for (int32_t x = 1; x < width - 1; ++x) {
+      const uint8_t *a = p + x - width, *b = p + x, *c = p + x + width;
+      if (a[-1] == 0 || a[1] == 0 || c[-1] == 0 || c[1] == 0 || b[0] == 0) continue;
+      const int32_t value =
+          a[-1] - 2 * a[0] + a[1] - 2 * (b[-1] - 2 * b[0] + b[1]) + c[-1] - 2 * c[0] + c[1];
+      ++bins[std::min(value < 0 ? -value : value, kNoiseBins - 1)];
+      ++total;
+    }
   }
-  return lines;
+  int32_t quartile = 0;
+  for (int32_t sum = bins[0]; 4 * sum < total; sum += bins[quartile]) ++quartile;
+  return quartile;
 }
 
-int16_t large_cost(const uint8_t* pixels, ptrdiff_t before) {
-  const int32_t change =
-      pixels[0] > pixels[before] ? pixels[0] - pixels[before] : pixels[before] - pixels[0];
-  return static_cast<int16_t>(std::max(kLeastLarge, kLarge * kEdge / (kEdge + change)));
-}
-
-// The step of the least sum, the first of several. *next is the least sum of the steps that are no
-// neighbours of it. line: room for the sums.
-int32_t least_step(const int16_t* sums, int32_t count, int16_t* line, int32_t* next) {
-  const int16_t least = least_of_line(sums, count);
-  int32_t at = 0;
-  while (sums[at] != least) ++at;
-  for (int32_t k = 0; k < count; ++k) line[k] = sums[k];
-  for (int32_t k = at - 1; k <= at + 1; ++k) line[k] = kNever;  // at the ends, in the padding
-  *next = least_of_line(line, count);
-  return at;
-}
-
-// The rows of the paths that come from above: from the left, from straight above, from the right.
-struct Above {
-  Lines before[3], after[3];
-  int16_t* least_before[3];
-  int16_t* least_after[3];
+// An image with its rows repeated beyond its first and last, smoothed or not.
+struct Source {
+  const uint8_t* pixels;
+  int32_t width, height;
+  const uint8_t* row(int32_t y) const {
+    return pixels + static_cast<ptrdiff_t>(std::min(std::max(y, 0), height - 1)) * width;
+  }
 };
+
+Source smoothed(const Source& from, const tvk_dense_table& kernels, uint8_t* to) {
+  for (int32_t y = 0; y < from.height; ++y) {
+    const uint8_t* const rows[3] = {from.row(y - 1), from.row(y), from.row(y + 1)};
+    kernels.smooth_row(rows, from.width, to + static_cast<ptrdiff_t>(y) * from.width);
+  }
+  return {to, from.width, from.height};
+}
+
+void codes_of(const Source& source, const tvk_dense_table& kernels, int32_t y, int32_t tolerance,
+              uint8_t* brighter, uint8_t* darker) {
+  constexpr int32_t kReach = TVK_DENSE_CENSUS_REACH;
+  const uint8_t* rows[2 * kReach + 1];
+  for (int32_t v = -kReach; v <= kReach; ++v) rows[v + kReach] = source.row(y + v);
+  kernels.census_codes(rows, source.width, tolerance, brighter, darker);
+}
+
+// Whether image 1 chose the same cell: the least sum that leads to the pixel is that of this step,
+// or of a neighbour's to within one.
+bool agrees(const tvk_dense_row& row, const uint8_t* least1, int32_t x, int32_t k, uint8_t least) {
+  const uint8_t other = least1[x + k];
+  const ptrdiff_t count = row.num_steps;
+  return least == other || (x > 0 && row.sums[(x - 1) * count + k + 1] == other) ||
+         (x < row.width - 1 && row.sums[(x + 1) * count + k - 1] == other);
+}
 
 }  // namespace
 
-size_t match_rows_bytes(int32_t width, int32_t num_steps) {
+size_t steps_entries(int32_t max_cells, int32_t longest_side) {
+  constexpr size_t kFrame = 2 * TVK_DENSE_REACH;
+  return static_cast<size_t>(max_cells) +
+         2 * (kFrame + TVK_DENSE_SPAN) * static_cast<size_t>(longest_side) +
+         (kFrame + TVK_DENSE_SPAN) * kFrame;
+}
+
+size_t match_rows_bytes(int32_t width, int32_t num_steps, size_t cells) {
   const size_t n = static_cast<size_t>(width), steps = static_cast<size_t>(num_steps);
-  return 8 * lines_bytes(width, num_steps) + lines_bytes(2, num_steps) +
-         6 * arena_bytes<int16_t>(n) + arena_bytes<uint32_t>(n) + arena_bytes<uint32_t>(n + steps) +
-         arena_bytes<int16_t>(n + steps);
+  const size_t pitch = steps + 2 * TVK_DENSE_PAD;
+  return 2 * arena_bytes<uint8_t>(n * steps) + 2 * arena_bytes<uint8_t>(n * pitch) +
+         arena_bytes<uint8_t>(4 * pitch) + 7 * arena_bytes<uint8_t>(row_bytes(width)) +
+         3 * arena_bytes<uint8_t>(row_bytes(width + num_steps)) + pixels_bytes(cells) +
+         pixels_bytes(cells + n * steps);
 }
 
-void match_rows(const RowPair& rows, Arena& arena, int16_t* steps) {
+size_t pixels_bytes(size_t cells) { return arena_bytes<uint8_t>(cells + 2 * kPixelsFrame); }
+
+uint8_t* pixels_alloc(size_t cells, Arena& arena) {
+  return arena_alloc<uint8_t>(arena, cells + 2 * kPixelsFrame) + kPixelsFrame;
+}
+
+void match_rows(const RowPair& rows, const tvk_dense_table& kernels, Arena& arena,
+                const Steps& steps) {
   const ArenaScope scope(arena);
-  const int32_t width = rows.width, count = rows.num_steps, width1 = width + count - 1;
-  const size_t n = static_cast<size_t>(width), n1 = n + static_cast<size_t>(count);
-  const Lines costs = make_lines(width, count, arena), sums = make_lines(width, count, arena);
-  const Lines pair = make_lines(2, count, arena);
-  Above above;
-  for (int p = 0; p < 3; ++p) {
-    above.before[p] = make_lines(width, count, arena);
-    above.after[p] = make_lines(width, count, arena);
-    above.least_before[p] = arena_alloc<int16_t>(arena, n);
-    above.least_after[p] = arena_alloc<int16_t>(arena, n);
-    for (int32_t x = 0; x < width; ++x) above.least_before[p][x] = 0;
-  }
-  uint32_t* const census0 = arena_alloc<uint32_t>(arena, n);
-  uint32_t* const census1 = arena_alloc<uint32_t>(arena, n1);
-  int16_t* const least1 = arena_alloc<int16_t>(arena, n1);
+  const int32_t width = rows.width, count = rows.num_steps, width1 = rows.columns1();
+  const size_t n = static_cast<size_t>(width), line = static_cast<size_t>(count);
+  const size_t pitch = line + 2 * TVK_DENSE_PAD;
+  const auto bytes = [&](size_t size) { return arena_alloc<uint8_t>(arena, size); };
+  const auto row_of = [&](int32_t columns) { return bytes(row_bytes(columns)); };
+  uint8_t* before = bytes(n * pitch);
+  uint8_t* after = bytes(n * pitch);
+  uint8_t *const costs = bytes(n * line), *const sums = bytes(n * line);
+  uint8_t *const ends = bytes(4 * pitch), *const least = row_of(width);
+  uint8_t *const large = row_of(width), *const across = row_of(width);
+  uint8_t *const brighter0 = row_of(width), *const darker0 = row_of(width);
+  uint8_t *const chosen = row_of(width), *const margin = row_of(width);
+  uint8_t *const brighter1 = row_of(width1), *const darker1 = row_of(width1);
+  uint8_t* const least1 = row_of(width1);
+  std::memset(before, TVK_DENSE_NEVER, n * pitch);
+  std::memset(after, TVK_DENSE_NEVER, n * pitch);
+  for (size_t x = 0; x < n; ++x) std::memset(before + x * pitch + TVK_DENSE_PAD, 0, line);
+  std::memset(least, 0, n);
 
+  Source source0{rows.pixels0, width, rows.height}, source1{rows.pixels1, width1, rows.height};
+  const int32_t noise = std::max(noise_of(rows.pixels0, width, rows.height),
+                                 noise_of(rows.pixels1, width1, rows.height));
+  int32_t tolerance = kLeastTolerance;
+  if (noise >= kNoisy) {
+    const size_t cells = n * static_cast<size_t>(rows.height);
+    source0 = smoothed(source0, kernels, pixels_alloc(cells, arena));
+    source1 = smoothed(source1, kernels,
+                       pixels_alloc(cells + line * static_cast<size_t>(rows.height), arena));
+    // 2.5 standard deviations of the difference of two smoothed pixels.
+    tolerance = std::max(tolerance, (2 * noise + 1) / 3);
+  }
+  const ptrdiff_t entries = steps.pitch() * (rows.height + 2 * TVK_DENSE_REACH);
+  for (ptrdiff_t i = 0; i < entries; ++i) steps.data[i] = -1;
   for (int32_t y = 0; y < rows.height; ++y) {
-    const uint8_t* row0 = rows.pixels0 + static_cast<ptrdiff_t>(y) * width;
-    const uint8_t* row1 = rows.pixels1 + static_cast<ptrdiff_t>(y) * width1;
-    int16_t* const found = steps + static_cast<ptrdiff_t>(y) * width;
-    census_row(rows.pixels0, width, rows.height, y, census0);
-    census_row(rows.pixels1, width1, rows.height, y, census1);
+    const uint8_t *const row0 = rows.row0(y), *const row1 = rows.row1(y);
+    const uint8_t* const above = rows.row0(std::max(y - 1, 0));
+    codes_of(source0, kernels, y, tolerance, brighter0, darker0);
+    codes_of(source1, kernels, y, tolerance, brighter1, darker1);
+    kernels.edge_costs(row0, above, width, large, across);
+    const tvk_dense_row row = {width,  count, brighter0, darker0, brighter1, darker1, row0, large,
+                               across, costs, sums,      before,  after,     least,   ends};
+    kernels.sum_down(&row);
+    kernels.sum_across(&row);
+    int16_t* const found = steps.row(y);
+    kernels.choose_steps(&row, found, chosen, margin, least1);
+    std::swap(before, after);
     for (int32_t x = 0; x < width; ++x) {
-      int16_t *cost = costs.at(x), *sum = sums.at(x);
-      if (row0[x] == 0) {
-        for (int32_t k = 0; k < count; ++k) cost[k] = 0;
-      } else {
-        count_bits(census0[x], census1 + x, count, cost);
-        for (int32_t k = 0; k < count; ++k) {
-          if (row1[x + k] == 0) cost[k] = kOutside;
-        }
-      }
-      for (int32_t k = 0; k < count; ++k) sum[k] = 0;
-    }
-    // From the left, and the three paths from above.
-    int16_t least = 0;
-    for (int32_t k = 0; k < count; ++k) pair.at(1)[k] = 0;
-    for (int32_t x = 0; x < width; ++x) {
-      const int16_t large = x > 0 ? large_cost(row0 + x, -1) : static_cast<int16_t>(kLarge);
-      least = follow(costs.at(x), pair.at(1 - (x & 1)), least, large, count, pair.at(x & 1),
-                     sums.at(x));
-      for (int p = 0; p < 3; ++p) {
-        const int32_t from = std::min(std::max(x + p - 1, 0), width - 1);
-        const int16_t down =
-            y > 0 ? large_cost(row0 + x, from - x - width) : static_cast<int16_t>(kLarge);
-        above.least_after[p][x] =
-            follow(costs.at(x), above.before[p].at(from), above.least_before[p][from], down, count,
-                   above.after[p].at(x), sums.at(x));
-      }
-    }
-    for (int p = 0; p < 3; ++p) {
-      std::swap(above.before[p], above.after[p]);
-      std::swap(above.least_before[p], above.least_after[p]);
-    }
-    // From the right.
-    least = 0;
-    for (int32_t k = 0; k < count; ++k) pair.at(width & 1)[k] = 0;
-    for (int32_t x = width - 1; x >= 0; --x) {
-      const int16_t large = x < width - 1 ? large_cost(row0 + x, 1) : static_cast<int16_t>(kLarge);
-      least = follow(costs.at(x), pair.at(1 - (x & 1)), least, large, count, pair.at(x & 1),
-                     sums.at(x));
-    }
-    // The least sum of each pixel of image 1: the choice of the opposite direction has it.
-    for (int32_t x = 0; x < width1; ++x) least1[x] = kNever;
-    for (int32_t x = 0; x < width; ++x) lower(sums.at(x), count, least1 + x);
-    for (int32_t x = 0; x < width; ++x) {
-      const int16_t* const sum = sums.at(x);
-      int32_t next;
-      const int32_t k = least_step(sum, count, pair.at(0), &next);
-      bool good = row0[x] != 0 && row1[x + k] != 0 && k > 0 && k < count - 1 &&
-                  100 * sum[k] < kUnique * next;
-      if (good && sum[k] != least1[x + k]) {
-        good = (x > 0 && sums.at(x - 1)[k + 1] == least1[x + k]) ||
-               (x < width - 1 && sums.at(x + 1)[k - 1] == least1[x + k]);
-      }
-      found[x] = static_cast<int16_t>(good ? k : -1);
-    }
-  }
-}
-
-void keep_supported(const int16_t* steps, int32_t width, int32_t height, int16_t* kept) {
-  constexpr int32_t kReach = 4, kLeastShare = 60;  // per cent of a window of 9 x 9
-  for (int32_t y = 0; y < height; ++y) {
-    const int32_t top = std::max(0, y - kReach), bottom = std::min(height - 1, y + kReach);
-    for (int32_t x = 0; x < width; ++x) {
-      const ptrdiff_t at = static_cast<ptrdiff_t>(y) * width + x;
-      kept[at] = -1;
-      if (steps[at] < 0) continue;
-      const int32_t left = std::max(0, x - kReach), right = std::min(width - 1, x + kReach);
-      int32_t alike = 0;
-      for (int32_t v = top; v <= bottom; ++v) {
-        const int16_t* row = steps + static_cast<ptrdiff_t>(v) * width;
-        for (int32_t u = left; u <= right; ++u) {
-          const int32_t change = row[u] - steps[at];
-          alike += change >= -1 && change <= 1 ? 1 : 0;
-        }
-      }
-      if (100 * alike >= kLeastShare * (bottom - top + 1) * (right - left + 1))
-        kept[at] = steps[at];
+      const int32_t k = found[x];
+      const bool good = row0[x] != 0 && k > 0 && k < rows.range_steps - 1 && row1[x + k] != 0 &&
+                        margin[x] >= kLeastMargin && agrees(row, least1, x, k, chosen[x]);
+      if (!good) found[x] = -1;
     }
   }
 }

@@ -1,0 +1,161 @@
+/* The kernels of the dense cloud: a list and a table of their own, because nothing else uses them,
+   and a build without the dense cloud does not have them. What kernels.h says of its kernels holds
+   for these, too. */
+#ifndef TWOVIEW_KERNELS_DENSE_H
+#define TWOVIEW_KERNELS_DENSE_H
+
+#include <stdint.h>
+
+#include "kernels/kernels.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum {
+  TVK_DENSE_BLOCK = 32,       /* steps in a block of costs; lines have whole blocks */
+  TVK_DENSE_PAD = 32,         /* entries before and behind a line of path costs */
+  TVK_DENSE_CENSUS_REACH = 2, /* pixels around the middle of the census window */
+  TVK_DENSE_PATHS = 3,
+  TVK_DENSE_SMALL = 4,   /* the cost of a change of parallax by one step along a path */
+  TVK_DENSE_LARGE = 32,  /* of a change by more, where the image has no edge */
+  TVK_DENSE_NEVER = 200, /* above every cost of a path */
+  TVK_DENSE_REACH = 3,   /* cells around the middle of a window of least squares */
+  TVK_DENSE_SUMS = 10,   /* of such a window */
+  TVK_DENSE_NODES = 8,   /* columns between two at which the lens model is asked */
+  TVK_DENSE_SPAN = 16    /* columns of a block of cells */
+};
+
+/* The pixels of TVK_DENSE_NODES columns of a row, as polynomials of the column; none if the lens
+   model is not smooth there. */
+typedef struct tvk_dense_span {
+  double u[4], v[4];
+  int32_t is_smooth, reserved;
+} tvk_dense_span;
+
+/* Rows of cells around a row y, of `width` columns with TVK_DENSE_REACH more before and behind
+   them: n = 0 .. 2 TVK_DENSE_REACH are the rows from y - TVK_DENSE_REACH on, the last is the row
+   that the window of row y - 1 had before them. a: image 0; b: image 1 moved by the steps; g: four
+   times the mean slope of both; all 0 where a cell has no step, and `is_cell` 1 where it has one.
+ */
+typedef struct tvk_dense_rows {
+  const uint8_t *a[2 * TVK_DENSE_REACH + 2], *b[2 * TVK_DENSE_REACH + 2];
+  const int16_t *g[2 * TVK_DENSE_REACH + 2];
+  const uint8_t *is_cell[2 * TVK_DENSE_REACH + 2];
+} tvk_dense_rows;
+
+/* The numbers with which fit_row weighs. */
+typedef struct tvk_dense_model {
+  float gain_prior; /* variance of a window, squared grey levels, at which its gain counts half */
+  float excess_sq;  /* by which the variance of the residuals is multiplied */
+  float noise_sq;   /* the least variance of the residuals, squared grey levels */
+  float step_info;  /* 1 / the variance of a mean step, without any texture, squared steps */
+  float floor_sq;   /* the least variance of a result, squared steps */
+} tvk_dense_model;
+
+/* One row of the two images, which correspond, and what the paths from above brought. Step k of
+   parallax is what moves column x of image 0 to column x + k of image 1. */
+typedef struct tvk_dense_row {
+  int32_t width, num_steps; /* num_steps: a multiple of TVK_DENSE_BLOCK */
+  const uint8_t *brighter0, *darker0, *brighter1, *darker1; /* what census_codes wrote */
+  const uint8_t *grey0;  /* 0: the pixel is outside the image that it came from */
+  const uint8_t *large;  /* of each column, the cost of a large change from above */
+  const uint8_t *across; /* of each column x, the same between x - 1 and x */
+  uint8_t *costs;        /* num_steps for each column */
+  uint8_t *sums;         /* the same: the path costs added up */
+  const uint8_t *before; /* path costs of the row above, lines of num_steps + 2 TVK_DENSE_PAD */
+  uint8_t *after;        /* and those of this row */
+  uint8_t *least;        /* of each column, the least of them: read, then written */
+  uint8_t *ends;         /* scratch: 4 lines of num_steps + 2 TVK_DENSE_PAD */
+} tvk_dense_row;
+
+/* The contract of each kernel. Rows of cells are read and written in whole blocks, of
+   TVK_DENSE_BLOCK in the kernels of the matching and of TVK_DENSE_SPAN in the others, up to two
+   entries before them, and four behind the last block: arrays have room for that, and what is
+   written behind `width` is without meaning.
+
+   census_codes: rows[0..4] are the rows y - 2 .. y + 2 of an image. Of each of 8 pairs of opposite
+   pixels around a pixel, one bit of `brighter` says whether the first is brighter than the second
+   by more than `tolerance`, and one of `darker` whether it is darker by more. Pixels that are 0,
+   which are outside their image, have all bits of `brighter`, so that half of the bits differ from
+   those of any other; the two columns at both ends have none.
+
+   edge_costs: of each column, the cost of a large change between the pixel and the one above, and
+   the one on its left: TVK_DENSE_LARGE less their difference, at least TVK_DENSE_SMALL.
+
+   sum_down: writes the costs of each column's steps, the number of bits in which the codes differ,
+   0 where grey0 is 0; continues the path from above, and writes its costs to `sums`.
+
+   sum_across: adds the paths from the left and from the right to `sums`.
+
+   choose_steps: of each column, the step of the least sum, the first of several; that sum; and how
+   much more the least sum of any step has that is not its neighbour. least1: for each column of
+   image 1, of which there are width + num_steps - 1, the least sum of the steps that lead there.
+   A column whose grey0 is 0 has zeros, and does not count in least1.
+
+   support_row: rows[0..6] are rows of steps, -1 where there is none, y - 3 .. y + 3, of `width`
+   columns with TVK_DENSE_REACH more before and behind them. How many of a column's 5 x 5
+   neighbours, itself included, have the same step to within one; how many of its 7 x 7 neighbours;
+   and the sum of the differences to it of the latter.
+
+   cell_sums: of the cells in a window of 7 x 7 around each column, with a, b and g of
+   tvk_dense_rows, writes the sums of a, b, g, aa, bb, gg, ab, ag, bg, and their number, in this
+   order, each to an array of `pitch`, a multiple of TVK_DENSE_SPAN that holds the width and its
+   frame. columns: scratch of as many arrays of TVK_DENSE_SPAN entries more each, those of the row
+   above unless `first`.
+
+   fit_row: from these sums, what support_row wrote and the steps, writes the parallax of each
+   column in steps, its standard deviation, and 255 times the correlation of the windows, at least 1
+   (dense/fraction.h); both windows count as having `gain_prior`
+   more variance that is alike, and those that would have to move by more than a step as unlike.
+
+   smooth_row: rows[0..2] are the rows y - 1 .. y + 1; the mean of 3 x 3 pixels with the weights 1 2
+   1 along both axes, rounded, at least 1. 0 where the pixel is 0, and the pixel itself in the first
+   and the last column.
+
+   place_span: the polynomials of a span at 0 .. TVK_DENSE_NODES - 1, in units of 1/65536 pixel of
+   an image that is `scale` times as large: (p + 0.5) scale - 0.5. u is -1 where that is not in the
+   image.
+
+   sample_span: the grey level of an image at each of `count` such places, by bilinear
+   interpolation, at least 1; 0 where u is negative. */
+#define TVK_DENSE_LIST(X)                                                                         \
+  X(census_codes, void,                                                                           \
+    (const uint8_t *const *rows, int32_t width, int32_t tolerance, uint8_t *brighter,             \
+     uint8_t *darker))                                                                            \
+  X(edge_costs, void,                                                                             \
+    (const uint8_t *row, const uint8_t *above, int32_t width, uint8_t *large, uint8_t *across))   \
+  X(sum_down, void, (const tvk_dense_row *row))                                                   \
+  X(sum_across, void, (const tvk_dense_row *row))                                                 \
+  X(choose_steps, void,                                                                           \
+    (const tvk_dense_row *row, int16_t *steps, uint8_t *least, uint8_t *margin, uint8_t *least1)) \
+  X(support_row, void,                                                                            \
+    (const int16_t *const *rows, int32_t width, uint8_t *support, uint8_t *alike, int8_t *slant)) \
+  X(cell_sums, void,                                                                              \
+    (const tvk_dense_rows *rows, int32_t pitch, int32_t first, int32_t *columns, int32_t *sums))  \
+  X(fit_row, void,                                                                                \
+    (const int32_t *sums, const int16_t *steps, const uint8_t *alike, const int8_t *slant,        \
+     int32_t pitch, const tvk_dense_model *model, float *parallax, float *sigma,                  \
+     uint8_t *similarity))                                                                        \
+  X(smooth_row, void, (const uint8_t *const *rows, int32_t width, uint8_t *out))                  \
+  X(place_span, void,                                                                             \
+    (const tvk_dense_span *span, double scale, int32_t width, int32_t height, int32_t *u,         \
+     int32_t *v))                                                                                 \
+  X(sample_span, void,                                                                            \
+    (const uint8_t *image, int32_t width, int32_t height, int64_t stride, const int32_t *u,       \
+     const int32_t *v, int32_t count, uint8_t *out))
+
+typedef struct tvk_dense_table {
+#define TVK_MEMBER(name, result, parameters) result(*name) parameters;
+  TVK_DENSE_LIST(TVK_MEMBER)
+#undef TVK_MEMBER
+} tvk_dense_table;
+
+/* Those that belong to a table of kernels.h. */
+const tvk_dense_table *tvk_dense_of(const tvk_table *kernels);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
