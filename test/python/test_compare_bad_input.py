@@ -57,6 +57,44 @@ class TestLists(BadInputTest):
         self.refused(self.compare(os.path.join(self.folder.name, "none.txt")), "none.txt")
         self.refused(self.compare(self.list_of("# nothing")), "no pair in it")
 
+    def test_a_mask_leaves_keypoints_out_of_every_pipeline(self):
+        import cv2
+        import numpy as np
+        shape = cv2.imread(os.path.join(support.MOTORCYCLE, support.IMAGES[0])).shape[:2]
+        half = np.full(shape, 255, np.uint8)
+        half[:, :shape[1] // 2] = 0
+        masks = os.path.join(self.folder.name, "masks")
+        os.mkdir(masks)
+        for name in support.IMAGES:
+            cv2.imwrite(os.path.join(masks, name + ".png"), half)
+        pairs = self.list_of(f"{support.LINE} {support.TRUTH}")
+        systems = ("--systems", "twoview,opencv_fast,opencv_sift", "--quiet")
+        rows = []
+        for words in ((), ("--mask", masks), ("--mask", f"{masks}/{support.IMAGES[0]}.png")):
+            done = self.compare(pairs, *systems, *words)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            report = self.report()
+            self.assertEqual(report["options"]["mask"], words[-1] if words else None)
+            rows.append(report["pairs"][0]["rows"]["pipeline"])
+        for system, whole in rows[0].items():
+            self.assertEqual(rows[1][system]["num_keypoints"], rows[2][system]["num_keypoints"])
+            if system == "twoview":  # takes as many of what is left
+                self.assertNotEqual(rows[1][system]["num_matches"], whole["num_matches"])
+                continue
+            for left, all_of_it in zip(rows[1][system]["num_keypoints"], whole["num_keypoints"]):
+                self.assertTrue(0.2 < left / all_of_it < 0.9, (system, left, all_of_it))
+        report = os.path.join(self.out, "report.json")
+        os.remove(report)
+        os.remove(os.path.join(self.out, "index.html"))
+        os.remove(os.path.join(self.out, "pairs.csv"))
+        cv2.imwrite(os.path.join(masks, support.IMAGES[1] + ".png"), half[1:])
+        self.refused(self.compare(pairs, *systems, "--mask", masks), "--mask", support.IMAGES[1],
+                     f"{shape[1]}x{shape[0] - 1}")
+        os.remove(os.path.join(masks, support.IMAGES[1] + ".png"))
+        self.refused(self.compare(pairs, *systems, "--mask", masks), "has no mask of",
+                     support.IMAGES[1])
+        self.refused(self.compare(pairs, *systems, "--mask", masks + "/none"), "no such file")
+
     def test_missing_images_are_named_and_counted(self):
         pairs = self.list_of(support.LINE.replace("left", "lost").replace("right", "gone"))
         self.refused(self.compare(pairs), "motorcycle_lost.png", "and 1 more")

@@ -174,6 +174,22 @@ def _extract_pycolmap(gray, cap):
     return points, (keypoints, descriptors)
 
 
+def masked(points, descriptors, used):
+    """What extract() returned, without the points on pixels where `used`, (height, width) bool, is
+    False."""
+    if not len(points):
+        return points, descriptors
+    x, y = (np.clip(np.rint(points[:, k]).astype(int), 0, used.shape[1 - k] - 1) for k in (0, 1))
+    kept = used[y, x]
+    if isinstance(descriptors, tuple):
+        pycolmap = estimators.pycolmap_module()
+        keypoints, own = descriptors
+        return points[kept], (
+            pycolmap.FeatureKeypoints([k for k, is_kept in zip(keypoints, kept) if is_kept]),
+            pycolmap.FeatureDescriptors(type=own.type, data=own.data[kept]))
+    return points[kept], descriptors[kept]
+
+
 def _two_nearest(products, distances):
     """For each row the nearest column, its distance and the smallest distance to another column;
     for each column the nearest row. distances(rows, products of these rows): their distances, an

@@ -8,7 +8,8 @@ from .errors import BadInput
 from .images import decode, shrunk
 
 
-def _load(path):
+def load_mask(path):
+    """(height, width) bool, True where the mask is not black. Raises BadInput."""
     try:
         pixels = decode(path, keeps_depth=True)
     except BadInput as error:
@@ -39,8 +40,8 @@ class Masks:
         without masks. Raises BadInput as the C++ reader does."""
         if not self.path:
             return None
-        file = self._file_of(name)
-        mask = self._only if self._only is not None else _load(file)
+        file = self.file_of(name)
+        mask = self._only if self._only is not None else load_mask(file)
         if file == self.path:
             self._only = mask
         if mask.shape != luma.shape:
@@ -48,7 +49,8 @@ class Masks:
                            f"{luma.shape[1]}x{luma.shape[0]}")
         return mask
 
-    def _file_of(self, name):
+    def file_of(self, name):
+        """The file of the mask of the picture `name`."""
         if not os.path.isdir(self.path):
             return self.path
         file = os.path.basename(name)

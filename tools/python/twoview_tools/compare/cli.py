@@ -14,6 +14,8 @@ import numpy as np
 
 from .. import formats, own_matches
 from ..accuracy import datasets
+from ..colmap.errors import BadInput
+from ..colmap.masks import Masks
 from ..folders import foreign_result, foreign_words
 from ..progress import Lines, on_terminal
 from ..sizes import MAX_NATIVE_SIDE, RESIZE_LONG_SIDE
@@ -24,10 +26,6 @@ from .arguments import PIPELINES, PROGRAM, make_parser
 FORMAT = 1  # increase it if a change here changes the stored result of a pair
 REFERENCE_TIMEOUT_S = 3600
 TABLES, FIGURES = ("csv", "tex"), ("svg", "pdf", "png")
-
-
-class BadInput(Exception):
-    """Bad input: one line for the user and exit status 2."""
 
 
 # ---- the command line --------------------------------------------------------------------------
@@ -157,14 +155,15 @@ def read_lists(arguments):
 
 
 def make_task(arguments, name, folder, pair, cameras):
-    views = []
+    views, masks = [], Masks(arguments.mask)
     for image, K in ((pair.name0, pair.K0), (pair.name1, pair.K1)):
         try:
             distortion = datasets.distortion_of(formats.choose_camera(cameras, image, K))
         except ValueError as error:
             raise BadInput(f"{name}: {error}") from error
         views.append({"name": image, "path": os.path.abspath(os.path.join(folder, image)),
-                      "K": K.tolist(), "distortion": distortion})
+                      "K": K.tolist(), "distortion": distortion,
+                      "mask": arguments.mask and os.path.abspath(masks.file_of(image))})
     truth = None if pair.R is None else {"R": pair.R.tolist(), "t": pair.t.tolist()}
     return {"what": "pair", "set": name, "views": views, "truth": truth,
             "resize": arguments.resize, "systems": arguments.systems,
@@ -191,12 +190,12 @@ def thin_out(tasks, most):
     return found
 
 
-def check_images(tasks, default_resize):
+def check_images(tasks, default_resize, mask=""):
     """Reads every image once; its hash shows in a later run whether the file has changed. Sets each
     task's "resize": with default_resize the value for the width of the first image of its list that
     no earlier list has (0 before there is one). Returns {path: hash}. BadInput names the first
     image that cannot be read and the number of the others."""
-    hashes, bad, resize = {}, [], {}
+    hashes, bad, resize, masks = {}, [], {}, Masks(mask)
     for task in tasks:
         for view in task["views"]:
             path = view["path"]
@@ -205,7 +204,12 @@ def check_images(tasks, default_resize):
             try:
                 with open(path, "rb") as f:
                     content = hashlib.sha256(f.read()).hexdigest()
-                height, width = datasets.read_luma(path).shape
+                luma = datasets.read_luma(path)
+                masks.of(view["name"], luma)
+                if view["mask"]:
+                    with open(view["mask"], "rb") as f:
+                        hashes[view["mask"]] = hashlib.sha256(f.read()).hexdigest()
+                height, width = luma.shape
                 if default_resize and task["set"] not in resize:
                     resize[task["set"]] = datasets.default_resize(width, height)
                 hashes[path] = content
@@ -218,6 +222,11 @@ def check_images(tasks, default_resize):
         why = f": {'the first' if others else 'it'} {unread}" if unread else ""
         raise BadInput(f"cannot read the image {bad[0]}{others}{why}")
     return hashes
+
+
+def contents(views, hashes):
+    """The hashes of the images and their masks."""
+    return [hashes[view[key]] for key in ("path", "mask") for view in views if view[key]]
 
 
 # ---- the reference -----------------------------------------------------------------------------
@@ -243,13 +252,13 @@ def set_references(arguments, tasks, workers, store, hashes):
 
 
 def _reconstruct(arguments, part, workers, store, hashes):
-    images = {v["name"]: {"path": v["path"], "K": v["K"], "distortion": v["distortion"]}
+    images = {v["name"]: {key: v[key] for key in ("path", "K", "distortion", "mask")}
               for t in part for v in t["views"]}
     task = {"what": "reference", "set": part[0]["set"], "images": images,
             "resize": part[0]["resize"], "seed": arguments.seed, "threads": arguments.jobs,
             "pairs": [[v["name"] for v in t["views"]] for t in part],
             "timeout_s": REFERENCE_TIMEOUT_S}
-    key = digest({**task, "threads": 0}, [hashes[i["path"]] for i in images.values()])
+    key = digest({**task, "threads": 0}, contents(images.values(), hashes))
     models = store.get(key)
     if models is None:
         try:
@@ -344,7 +353,7 @@ def run_pairs(tasks, keys, workers, store, quiet):
 def compare(arguments):
     tasks = read_lists(arguments)
     tasks = thin_out(tasks, arguments.max_pairs)
-    hashes = check_images(tasks, arguments.resize is None)
+    hashes = check_images(tasks, arguments.resize is None, arguments.mask)
     if arguments.resize is None and any(t["resize"] for t in tasks) and not arguments.quiet:
         print(f"{PROGRAM}: images are compared at {RESIZE_LONG_SIDE} pixels a side where the first "
               f"of their list is above {MAX_NATIVE_SIDE} (--resize 0: as they are)",
@@ -374,8 +383,7 @@ def compare(arguments):
             told = set_references(arguments, tasks, workers, store, hashes)
             for task in tasks:
                 task["missing"] = missing
-            keys = [digest(task, versions, [hashes[v["path"]] for v in task["views"]])
-                    for task in tasks]
+            keys = [digest(task, versions, contents(task["views"], hashes)) for task in tasks]
             pairs, num_run = run_pairs(tasks, keys, workers, store, arguments.quiet)
             where = workers.description
     except OSError as error:

@@ -12,6 +12,7 @@ import twoview
 
 from ..colmap import conventions
 from ..colmap import database as colmap_database
+from .masked import write_masks
 
 PROGRAM = "colmap"
 NAMES = "0.png", "1.png"
@@ -56,6 +57,7 @@ def run(views, cap, max_error_px, seed, watch):
         os.mkdir(images)
         for name, gray in zip(NAMES, views.gray):
             cv2.imwrite(os.path.join(images, name), gray, [cv2.IMWRITE_PNG_COMPRESSION, 1])
+        masks = write_masks(os.path.join(folder, "masks"), dict(zip(NAMES, views.used)))
         watch.lap()
         by_camera = {}
         for name, size, camera in zip(NAMES, views.sizes, views.cameras):
@@ -67,6 +69,7 @@ def run(views, cap, max_error_px, seed, watch):
             _run("feature_extractor", "--database_path", database, "--image_path", images,
                  "--image_list_path", listed, "--ImageReader.camera_model", model,
                  "--ImageReader.camera_params", parameters, "--ImageReader.single_camera", 1,
+                 *(("--ImageReader.mask_path", masks) if masks else ()),
                  "--SiftExtraction.use_gpu", 0, "--SiftExtraction.num_threads", 1,
                  "--SiftExtraction.max_num_features", cap, "--random_seed", seed)
         watch.lap("extract")

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..accuracy import datasets, estimators
 from . import colmap_program
+from .masked import used_pixels, write_masks
 
 
 def reconstruct(task):
@@ -22,23 +23,27 @@ def reconstruct(task):
     with tempfile.TemporaryDirectory() as folder:
         database, images = os.path.join(folder, "database.db"), os.path.join(folder, "images")
         files = {name: f"{i:06d}.png" for i, name in enumerate(sorted(task["images"]))}
-        by_camera = {}
+        by_camera, used = {}, {}
         for name, image in task["images"].items():
             gray, scale_x, scale_y = datasets.resized_luma(image["path"], task["resize"])
             os.makedirs(images, exist_ok=True)
             cv2.imwrite(os.path.join(images, files[name]), gray)
+            used[files[name]] = used_pixels(image["mask"], gray.shape)
             K = datasets.scale_K(np.array(image["K"]), scale_x, scale_y)
             size = gray.shape[::-1]
             camera = (*colmap_program.camera_arguments(size, K, image["distortion"]), size)
             by_camera.setdefault(camera, []).append(files[name])
+        masks = write_masks(os.path.join(folder, "masks"), used)
         for (model, parameters, _), names in by_camera.items():
-            _extract(pycolmap, database, images, names, model, parameters, task["threads"])
+            _extract(pycolmap, database, images, masks, names, model, parameters, task["threads"])
         _match(pycolmap, database, folder, task, files)
         return _map(pycolmap, database, images, folder, task, files)
 
 
-def _extract(pycolmap, database, images, names, model, parameters, threads):
+def _extract(pycolmap, database, images, masks, names, model, parameters, threads):
     reader = pycolmap.ImageReaderOptions()
+    if masks:
+        reader.mask_path = masks
     reader.camera_model, reader.camera_params = model, parameters
     options = pycolmap.FeatureExtractionOptions()
     options.num_threads, options.use_gpu = threads, False

@@ -128,6 +128,7 @@ def make_report(arguments, run, pairs):
         "own": [{key: entry[key] for key in ("id", "note", "options")} for entry in arguments.own],
         "num_pairs": len(pairs), "sets": {s: sum(p["set"] == s for p in pairs) for s in sets},
         "options": {"max_error_px": arguments.max_error_px, "resize": run["resize"],
+                    "mask": arguments.mask or None,
                     "seed": arguments.seed, "timeout_s": arguments.timeout,
                     "jobs": arguments.jobs, "systems": arguments.systems},
         "versions": run["versions"], "machine": tables.machine(), "where": run["where"],

@@ -22,6 +22,7 @@ import numpy as np
 
 from ..accuracy import datasets, estimators
 from . import systems
+from .masked import used_pixels
 
 
 GRAVITY_SIGMA_RAD = np.radians(0.5)  # error of the gravity taken from a reference pose
@@ -51,13 +52,15 @@ def luma(path, resize):
 
 
 class Views:
-    """The two images of a task, and their cameras at the scale of the images."""
+    """The two images of a task, their cameras at the scale of the images, and which pixels of each
+    are used."""
 
     def __init__(self, task):
-        self.gray, self.cameras, self.file_sizes = [], [], []
+        self.gray, self.cameras, self.file_sizes, self.used = [], [], [], []
         for view in task["views"]:
             image, scale_x, scale_y = luma(view["path"], task["resize"])
             self.gray.append(image)
+            self.used.append(used_pixels(view["mask"], image.shape))
             self.file_sizes.append((round(image.shape[1] / scale_x),
                                     round(image.shape[0] / scale_y)))
             K = datasets.scale_K(np.array(view["K"]), scale_x, scale_y)
@@ -84,7 +87,7 @@ def run_twoview(views, options, task):
     width, height = np.max(views.sizes, axis=0)
     context = twoview_context(int(width), int(height), 0)
     watch = Stopwatch()
-    features = [context.extract(gray) for gray in views.gray]
+    features = [context.extract(gray, mask=used) for gray, used in zip(views.gray, views.used)]
     watch.lap("extract")
     links = context.match(features[0][1], features[1][1], None, features[0][0], features[1][0])
     watch.lap("match")
@@ -105,23 +108,27 @@ def run_twoview(views, options, task):
 
 
 @functools.lru_cache(maxsize=48)
-def peer_features(path, resize, front):
-    """(points, descriptors, milliseconds). The features of the latest 48 images are kept; the time
+def peer_features(path, mask, resize, front):
+    """(points, descriptors, milliseconds), without those on pixels that the mask leaves out. The
+    features of the latest 48 images are kept; the time
     of their extraction counts in each pair that uses them."""
     from ..accuracy import peers
     gray = luma(path, resize)[0]
     start = time.perf_counter()
     points, descriptors = peers.extract(gray, dict(front))
+    used = used_pixels(mask, gray.shape)
+    if used is not None:
+        points, descriptors = peers.masked(points, descriptors, used)
     return points, descriptors, 1e3 * (time.perf_counter() - start)
 
 
 @functools.lru_cache(maxsize=4)
-def peer_matches(path0, path1, resize, front):
+def peer_matches(path0, path1, mask0, mask1, resize, front):
     """(pixels0, pixels1, ratios or None, numbers of keypoints, ms). Systems that differ only in
     their estimator share these matches."""
     from ..accuracy import peers
-    (points0, d0, ms0), (points1, d1, ms1) = (peer_features(path, resize, front)
-                                              for path in (path0, path1))
+    (points0, d0, ms0), (points1, d1, ms1) = (
+        peer_features(path, mask, resize, front) for path, mask in ((path0, mask0), (path1, mask1)))
     watch = Stopwatch()
     find = peers.match_pycolmap if dict(front)["front"] == "pycolmap" else peers.match
     index0, index1, ratios = find(d0, d1)
@@ -132,8 +139,8 @@ def peer_matches(path0, path1, resize, front):
 
 def run_peer_pipeline(views, options, task):
     front = tuple((k, v) for k, v in options.items() if k not in ("estimator", "max_error_px"))
-    *found, num_keypoints, ms = peer_matches(*(view["path"] for view in task["views"]),
-                                             task["resize"], front)
+    *found, num_keypoints, ms = peer_matches(
+        *(view[key] for key in ("path", "mask") for view in task["views"]), task["resize"], front)
     matches = views.matches(*found)
     watch = Stopwatch()
     pose = estimators.run_peer(options["estimator"], matches,

@@ -73,20 +73,19 @@ def code_table(printed):
         values = {"two images: keypoints, matches, pose, points": parts[1],
                   "odometry": parts[2], "the dense cloud and depth maps": parts[3],
                   "the room": parts[4], "all": int(whole[1]) + int(whole[2])}
-        if stack:
-            values["deepest stack"] = stack[1]
+        values["deepest stack"] = stack and stack[1]  # scripts/footprint --built LIBRARY has none
         for name, value in values.items():
-            rows.setdefault(name, []).append(_grouped(int(value)))
+            rows.setdefault(name, []).append(_grouped(int(value)) if value else "-")
     if not cpus:
         raise SystemExit("no architecture of " + ", ".join(CPUS) + " in that text")
     return _table(["bytes of text and data", *cpus], [[name, *row] for name, row in rows.items()])
 
 
 def replaced(text, name, table):
-    pattern = rf"(<!-- made: {name} -->\n)\n*(?:\|.*\n)*"
+    pattern = rf"(<!-- made: {name} -->\n)\n*(?:\|.*\n)*\n*"
     if not re.search(pattern, text):
         raise SystemExit(f"{PAGE}: no line <!-- made: {name} -->")
-    return re.sub(pattern, lambda found: found[1] + "\n" + table, text)
+    return re.sub(pattern, lambda found: found[1] + "\n" + table + "\n", text)
 
 
 def main():
