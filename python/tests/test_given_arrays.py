@@ -1,5 +1,5 @@
-"""Arrays of another number type, lists and strided arrays become what C reads, with the same result;
-a Camera is made of a matrix."""
+"""Arrays of another number type, lists and strided arrays become what C reads, with the same
+result; a Camera is made of a matrix."""
 
 import copy
 import dataclasses

@@ -182,8 +182,8 @@ def cloud(points: Any, pose: Optional[TwoView] = None, *, colours: Any = None,
 
     points: a Reconstruction, an array of twoview.POINT or DENSE_POINT, or (n, 3). pose: None, or
     of estimate_two_view or reconstruct, in the unit of the points. colours: None (by depth), or
-    what matplotlib takes, such as (n, 3) in [0, 1]. share: of the points whose box is shown, the nearest
-    ones: some are very far. axes: matplotlib's with projection "3d", None for a new figure.
+    what matplotlib takes, such as (n, 3) in [0, 1]. share: of the points whose box is shown, the
+    nearest ones: some are very far. axes: matplotlib's with projection "3d", None for a new figure.
     Returns matplotlib's Figure. Raises ImportError without matplotlib, ValueError for another shape
     and where there is no point."""
     if isinstance(points, Reconstruction):

@@ -176,7 +176,8 @@ class Report(unittest.TestCase):
                 self.assertEqual((done.returncode, done.stderr.count("\n")), (2, 1), done.stderr)
                 self.assertIn(message, done.stderr)
             done = support.run(*words, "--matches", os.path.join(folder, "net"), "--poses",
-                               "hand=" + own_file, "--matches-resize", 741 // 2 + 1, "--tables", "csv,tex",
+                               "hand=" + own_file, "--matches-resize", 741 // 2 + 1,
+                               "--tables", "csv,tex",
                                *(("--figures", "svg,pdf") if draws else ()))
             self.assertEqual(done.returncode, 0, done.stderr)
             with open(os.path.join(out, "report.json"), encoding="utf-8") as f:

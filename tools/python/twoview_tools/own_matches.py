@@ -297,8 +297,8 @@ def require_pixels(matches, sizes, name, may_be_smaller=True):
     if may_be_smaller and len(matches) >= TELLING and all((2 * pixels < size).all()
                                        for pixels, size in zip(both, sizes)):
         raise Refused(f"{name} has no match in the right or the lower half of either picture: were "
-                      "they matched smaller? --matches-resize L says their longer side then, 0 that "
-                      "they were not")
+                      "they matched smaller? --matches-resize L says their longer side then, 0 "
+                      "that they were not")
 
 
 # ---- folders -------------------------------------------------------------------------------------

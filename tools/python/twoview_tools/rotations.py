@@ -7,8 +7,8 @@ MOST_ROTATION_ERROR = 0.01  # of an element; tools/twoview/base/matrix.h has the
 
 def made_rotation(matrix, name):
     """The rotation that is nearest to a 3x3 matrix of a file (the least sum of squared
-    differences). ValueError, whose text begins with `name`, where an element is farther than MOST_ROTATION_ERROR
-    from it, and for a reflection."""
+    differences). ValueError, whose text begins with `name`, where an element is farther than
+    MOST_ROTATION_ERROR from it, and for a reflection."""
     matrix = np.asarray(matrix, float).reshape(3, 3)
     size = np.linalg.det(matrix)
     if size < 0:
