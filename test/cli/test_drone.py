@@ -155,7 +155,7 @@ class Drone(unittest.TestCase):
         self.assertIn("-0.52, 0.27, 0, 0, 0", " ".join(texts[0].split()))
 
     def test_a_lens_of_another_size_is_scaled_where_that_is_wanted(self):
-        big, lens = self.path("big.yaml"), self.path("lens.yaml")
+        big, lens = (os.path.join(self.folder.name, name) for name in ("big.yaml", "lens.yaml"))
         pathlib.Path(big).write_text(
             "image_width: 1280\nimage_height: 720\ncamera_name: c\n"
             "camera_matrix: {rows: 3, cols: 3, data: [1136, 0, 640.5, 0, 1134, 360.5, 0, 0, 1]}\n"
