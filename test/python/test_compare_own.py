@@ -160,7 +160,7 @@ class Report(unittest.TestCase):
             right = np.column_stack([x - 994.978 / depth + 31.086, y])
             half = [(pixels + 0.5) / 2 - 0.5 for pixels in (left, right)]
             np.savez(os.path.join(folder, "net", "motorcycle_left_motorcycle_right.npz"),
-                     mkpts0=half[0], mkpts1=half[1])
+                     mkpts0=half[0], mkpts1=half[1], descriptors0=left)
             own_file = support.write(
                 folder, "mine.txt", " ".join([*support.IMAGES, "1 0 0 -1 0 1 0 0 0 0 1 0\n"]))
             out = os.path.join(folder, "report")
@@ -187,6 +187,7 @@ class Report(unittest.TestCase):
             self.assertEqual(rows["pipeline"]["hand"]["pose_error_deg"], 0)
             self.assertIsNone(rows["pipeline"]["hand"]["time_ms"])
             self.assertEqual(rows["pipeline"]["net"]["num_matches"], 200)
+            self.assertEqual(rows["pipeline"]["net"]["message"], "not used: descriptors0")
             for row in (rows["pipeline"]["net"], *rows["solver"].values()):
                 self.assertLess(row["pose_error_deg"], 0.5, row)
                 self.assertEqual(row["num_matches"], 200)

@@ -54,7 +54,8 @@ class Run:
         except children.ChildError as error:
             return None, error.status, str(error)
         self.seconds[f"{system.kind} {system.id}"] = round(seconds, 4)
-        return reply, "ok", ""
+        note = reply.get("note", "") if isinstance(reply, dict) else ""
+        return reply, "ok", note
 
     def read_images(self):
         """Reads the images before any system runs, so that the time of reading is not charged to

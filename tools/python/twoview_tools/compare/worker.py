@@ -183,7 +183,9 @@ def run_own(views, options, task):
     return {**pose_answer(R, t, inliers, found),
             "config": twoview_ctypes.enum_name("kind", found.kind),
             "verdict": twoview_ctypes.enum_name("verdict", found.verdict),
-            "probability_wrong": found.probability_wrong, **matches_answer(matches)}, watch.ms
+            "probability_wrong": found.probability_wrong,
+            "note": "not used: " + ", ".join(given.left_out) if given.left_out else "",
+            **matches_answer(matches)}, watch.ms
 
 
 def pose_answer(R, t, inliers, found=None):
