@@ -2,6 +2,7 @@
 """Tests of matches and poses by other programs: --matches of reconstruct and evaluate, --poses of
 evaluate. The matches are exact pixels of the rendered pair, written as the common matchers write
 them, with Python's standard library alone."""
+import csv
 import io
 import json
 import random
@@ -216,6 +217,8 @@ class OwnMatches(cli.CliTest):
         for scale in (1 / WIDTH, 1 / cli.FOCAL, 2 / WIDTH):
             rows = [tuple(scale * v for v in row) for row in self.rows]
             self.refused(npz(mkpts0=points(rows, 0), mkpts1=points(rows, 1)), "normalised")
+            self.refused(npz(mkpts0=points(self.rows, 0), mkpts1=points(rows, 1)), "normalised",
+                         "image 1")
 
     def test_matches_of_smaller_pictures(self):
         half = [tuple((v + 0.5) / 2 - 0.5 for v in row) for row in self.rows]
@@ -322,6 +325,24 @@ class Evaluate(cli.CliTest):
         # The inverse serves the pair in the other order.
         self.succeed(self.evaluate("--poses", "good.txt"))
         self.assertEqual(self.report()["systems"][0]["auc_signed"]["5"], 100)
+
+    def test_tables_for_a_paper(self):
+        self.write("a_1.txt", "a.png b.png 1 0 0 -1  0 1 0 0  0 0 1 0\n")
+        text = pair_line() + pair_line(name1="none.png")
+        self.succeed(self.evaluate("--poses", "a_1.txt", "--tables", text=text))
+        self.assertEqual(self.listing(), ["pairs.csv", "report.json", "systems.csv", "systems.tex"])
+        rows = list(csv.DictReader((self.out / "pairs.csv").read_text().splitlines()))
+        pairs = self.report()["pairs"]
+        self.assertEqual(float(rows[0]["pose_error_deg"]), pairs[0]["pose_error_deg"])
+        self.assertEqual(rows[0]["pose_error_deg a_1"], "0.0")
+        self.assertEqual((rows[1]["pose_error_deg"], rows[1]["error"]), ("", pairs[1]["error"]))
+        systems = list(csv.DictReader((self.out / "systems.csv").read_text().splitlines()))
+        self.assertEqual([s["system"] for s in systems], ["twoview", "a_1"])
+        self.assertEqual([s["num_without_pose"] for s in systems], ["1", "1"])
+        self.assertEqual(float(systems[1]["auc_20"]), 50)
+        tex = (self.out / "systems.tex").read_text()
+        best = "\\textbf{50.0} & " * 3
+        self.assertIn("a\\_1 & " + best + "-- & 1 \\\\\n", tex)
 
     def test_bad_poses_are_named(self):
         for text, *words in (

@@ -75,6 +75,44 @@ class Page(cli.CliTest):
                 self.assertGreater(found["lit"], 500)
 
 
+class Printed(cli.CliTest):
+    def test_nothing_is_cut_or_folded_on_paper(self):
+        """The print style on the screen, and the event that a browser sends before it prints."""
+        self.succeed(self.reconstruct())
+        page = (self.out / "report.html").read_text(errors="replace")
+        page = page.replace("@media print", "@media all")
+        probe = """<script>addEventListener("load", () => setTimeout(() => {
+          const count = () => document.querySelectorAll("details:not([open])").length;
+          const before = count();
+          dispatchEvent(new Event("beforeprint"));
+          const cut = (e) => e.scrollWidth > e.clientWidth + 1 ||
+            e.scrollHeight > e.clientHeight + 1;
+          const shown = (e) => e.getClientRects().length > 0;
+          const found = {before: before, during: count(),
+            cut: [...document.querySelectorAll("pre, table, .card, .stage")].filter(cut).length,
+            buttons: [...document.querySelectorAll("button")].filter(shown).length,
+            json: document.querySelector("details pre").getBoundingClientRect().height};
+          dispatchEvent(new Event("afterprint"));
+          found.after = count();
+          document.title = JSON.stringify(found);
+        }, 100));</script>"""
+        path = self.write("print.html", page.replace("</body>", probe + "</body>"))
+        common = [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu",
+                  "--virtual-time-budget=3000", f"--user-data-dir={self.folder}/profile"]
+        done = subprocess.run([*common, "--window-size=700,900", "--dump-dom", path.as_uri()],
+                              capture_output=True, timeout=120)
+        title = re.search(r"<title>(.*?)</title>", done.stdout.decode()).group(1)
+        found = json.loads(title)
+        self.assertEqual((found["before"], found["during"], found["after"]), (1, 0, 1))
+        self.assertEqual((found["cut"], found["buttons"]), (0, 0))
+        self.assertGreater(found["json"], 2000)
+        # As PDF: the numbers and the whole of result.json are several pages more.
+        pdf = self.folder / "report.pdf"
+        subprocess.run([*common, f"--print-to-pdf={pdf}", (self.out / "report.html").as_uri()],
+                       capture_output=True, timeout=120, check=True)
+        self.assertGreaterEqual(len(re.findall(rb"/Type /Page\b(?!s)", pdf.read_bytes())), 6)
+
+
 if __name__ == "__main__":
     if not CHROMIUM:
         print("skipped: there is no Chromium")

@@ -261,7 +261,8 @@ std::string cloud_section(const FlightResult& result) {
   return "<section>\n<h2>Path and map</h2>\n<div class=\"stage\"><canvas id=\"cloud\"></canvas>\n"
          "<div class=\"buttons\"><button id=\"view-front\">front</button>"
          "<button id=\"view-side\">side</button><button id=\"view-top\">top</button></div></div>\n"
-         "<p class=\"hint\">Drag to turn, wheel or pinch to zoom, shift and drag to move, double "
+         "<p class=\"hint screen\">Drag to turn, wheel or pinch to zoom, shift and drag to move, "
+         "double "
          "click to start again. The path is yellow" +
          truth + "; the keyframe that is shown below is orange. Lengths are in " +
          (is_metric ? "metres" : "distances of the first two keyframes") + "." + others +
@@ -346,7 +347,8 @@ std::string flight_report(const FlightResult& result, const std::string& name,
                               {"keyframes", keyframes_section(data["keyframes"])},
                               {"json", escaped(json_text(result.json))},
                               {"version", tv_version_string()},
-                              {"script", script}});
+                              {"script", script},
+                              {"print", kPrintScript}});
 }
 
 }  // namespace cli

@@ -38,11 +38,10 @@ void require_inside(const std::string& name, const MatchList& matches, size_t im
   }
 }
 
-bool are_normalised(const MatchList& matches) {
-  for (const std::vector<double>& pixels : matches.pixels)
-    for (const double value : pixels)
-      if (!(std::abs(value) <= kMostNormalised)) return false;
-  return true;
+// Whether the coordinates of an image are normalised.
+bool are_normalised(const std::vector<double>& pixels) {
+  return std::all_of(pixels.begin(), pixels.end(),
+                     [](double value) { return std::abs(value) <= kMostNormalised; });
 }
 
 // Whether no match lies in the right half or the lower half of this picture.
@@ -133,11 +132,13 @@ void fit_to_pictures(const Picture pictures[2], int resize, const std::string& n
   cv::Size sizes[2];  // of the pictures that were matched
   for (size_t v = 0; v < 2; ++v)
     sizes[v] = shrunk_size({pictures[v].file_width, pictures[v].file_height}, resize);
-  const bool is_large = std::max(sizes[0].width, sizes[0].height) > 2 * kMostNormalised;
-  if (is_large && are_normalised(matches))
-    throw BadInput(name +
-                   " has normalised coordinates (none is above 2), and pixels are needed: "
-                   "multiply them by the camera's matrix, or by the picture's size");
+  for (size_t v = 0; v < 2; ++v) {
+    const bool is_large = std::max(sizes[v].width, sizes[v].height) > 2 * kMostNormalised;
+    if (is_large && are_normalised(matches.pixels[v]))
+      throw BadInput(name + " has normalised coordinates in image " + std::to_string(v) +
+                     " (none is above 2), and pixels are needed: multiply them by the camera's "
+                     "matrix, or by the picture's size");
+  }
   for (size_t v = 0; v < 2; ++v) require_inside(name, matches, v, sizes[v]);
   if (resize < 0 && matches.size() >= kTelling && leaves_most_empty(matches, 0, sizes[0]) &&
       leaves_most_empty(matches, 1, sizes[1]))

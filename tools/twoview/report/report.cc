@@ -220,7 +220,8 @@ std::string cloud_section(const Outcome& outcome, const std::vector<CloudPoint>&
   return "<section>\n<h2>The cloud</h2>\n<div class=\"stage\"><canvas id=\"cloud\"></canvas>\n"
          "<div class=\"buttons\"><button id=\"view-front\">front</button>"
          "<button id=\"view-side\">side</button><button id=\"view-top\">top</button></div></div>\n"
-         "<p class=\"hint\">Drag to turn, wheel or pinch to zoom, shift and drag to move, double "
+         "<p class=\"hint screen\">Drag to turn, wheel or pinch to zoom, shift and drag to move, "
+         "double "
          "click "
          "to start again. Camera 0 is white, camera 1 orange; x right, y down, z forward. Lengths "
          "are in " +
@@ -279,7 +280,8 @@ std::string report_html(const Outcome& outcome, const std::vector<CloudPoint>& c
        {"tables", tables(outcome)},
        {"json", escaped(json_text(outcome.json))},
        {"version", tv_version_string()},
-       {"script", cloud_script(outcome, cloud)}});
+       {"script", cloud_script(outcome, cloud)},
+       {"print", kPrintScript}});
 }
 
 }  // namespace cli

@@ -156,7 +156,8 @@ std::string room_report(const RoomScene& scene, const RoomModel& model, const st
                             {"room", section.html},
                             {"json", escaped(json_text(json))},
                             {"version", tv_version_string()},
-                            {"script", section.script}});
+                            {"script", section.script},
+                            {"print", kPrintScript}});
 }
 
 }  // namespace cli

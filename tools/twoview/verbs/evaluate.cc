@@ -23,6 +23,7 @@
 #include "pair/options.h"
 #include "pair/own_matches.h"
 #include "pair/reconstruct_pair.h"
+#include "verbs/evaluate_tables.h"
 #include "verbs/verbs.h"
 
 namespace cli {
@@ -42,6 +43,7 @@ struct Arguments {
   int max_pairs = 0;
   OwnMatchOptions own;
   std::vector<std::string> poses;  // of --poses, each [NAME=]FILE
+  bool has_tables = false;
 };
 
 struct Errors {
@@ -532,6 +534,11 @@ int evaluate(Arguments& a) {
   Json report = report_json(a, systems, reports, session);
   report["interrupted"] = interrupted;
   files.add(name, json_text(report));
+  if (a.has_tables) {
+    files.add("pairs.csv", pairs_csv(report));
+    files.add("systems.csv", systems_csv(report));
+    files.add("systems.tex", systems_tex(report));
+  }
   if (common.json) print(json_text(report));
   const std::string notes = common.note_lines();
   if (common.speaks())
@@ -564,6 +571,8 @@ void add_evaluate(CLI::App& program, Run& run) {
                    "[R t], a line a pair; may be given several times")
       ->type_name("[NAME=]FILE")
       ->allow_extra_args(false);
+  verb->add_flag("--tables", a->has_tables,
+                 "also write pairs.csv, and systems.csv and systems.tex (LaTeX)");
   add_common(*verb, a->common, kAllOptions, "folder for report.json, or the file itself");
   a->own.add_to(*verb,
                 "folder with the matches of each pair by another program, in place of twoview's: "
