@@ -235,6 +235,17 @@ class OdometryTest(CliTest):
                            for p, grey in zip(points, greys))
             self.assertLess(apart[len(apart) // 2], 8)
 
+    def test_a_blank_in_a_name_of_the_colmap_model_is_named(self):
+        for i, data in enumerate(PICTURES):
+            self.write(f"pictures/my {i:05}.png", data)
+        camera = self.write("camera.yaml", camera_yaml(WIDTH, HEIGHT, FOCAL))
+        done = self.succeed(self.odometry(self.folder / "pictures", "--fps", "15", "--camera",
+                                          camera))
+        note, = (n for n in self.result()["notes"] if "blank" in n)
+        self.assertIn("'my 00000.png' has a blank", note)
+        self.assertIn("has a blank", done.stdout.decode())
+        self.assertNotIn("my ", (self.out / "colmap/sparse/images.txt").read_text())
+
     def test_the_colmap_model_is_consistent(self):
         self.succeed(self.odometry(self.set_folder()))
 

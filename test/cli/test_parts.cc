@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "base/error.h"
+#include "base/upright.h"
 #include "files/camera_formats.h"
 #include "files/camera_set.h"
 #include "files/image_header.h"
@@ -583,6 +584,43 @@ void test_the_cloud_has_the_points_whose_rays_meet_at_an_angle() {
   TEST_ASSERT_EQUAL_UINT64(0, cloud_points({}, {}).size());
 }
 
+// world_from_cam of a camera that was turned by `yaw`, tilted down by `pitch` and then rolled
+// clockwise by `roll`; the world's y axis points down.
+Matrix3 held(double yaw_deg, double pitch_deg, double roll_deg) {
+  const auto about = [](size_t axis, double degrees) {
+    const double angle = degrees * 3.14159265358979323846 / 180;
+    const size_t a = (axis + 1) % 3, b = (axis + 2) % 3;
+    Matrix3 R{1, 0, 0, 0, 1, 0, 0, 0, 1};
+    R[4 * a] = R[4 * b] = std::cos(angle);
+    R[3 * b + a] = std::sin(angle);
+    R[3 * a + b] = -R[3 * b + a];
+    return R;
+  };
+  return product(product(about(1, yaw_deg), about(0, -pitch_deg)), about(2, roll_deg));
+}
+
+double degrees_from_up(const Vector3& up) {
+  return std::acos(std::min(1.0, -up[1])) * 180 / 3.14159265358979323846;
+}
+
+void test_up_is_up_however_far_the_cameras_look_down() {
+  std::vector<Matrix3> around, ahead;
+  for (int yaw = 0; yaw < 200; yaw += 10) around.push_back(held(yaw, 40, yaw % 20 == 0 ? 3 : -3));
+  TEST_ASSERT_TRUE(degrees_from_up(up_of_cameras(around)) < 1.5);
+  // Cameras that never turned say it about their x axis only by how they are held as a rule.
+  for (int pitch = -4; pitch <= 4; ++pitch) ahead.push_back(held(0, 20 + pitch, 0));
+  const Vector3 up = up_of_cameras(ahead);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0, up[0]);
+  TEST_ASSERT_DOUBLE_WITHIN(0.1, 20, degrees_from_up(up));
+  TEST_ASSERT_EQUAL_DOUBLE(-1, up_of_cameras({})[1]);
+  // A telephone stores what it filmed upright lying on its side: of 90 degrees, its x axis down.
+  for (const int turn : {90, 180, 270}) {
+    std::vector<Matrix3> stored;
+    for (const Matrix3& R : around) stored.push_back(product(R, held(0, 0, turn)));
+    TEST_ASSERT_TRUE(degrees_from_up(up_of_cameras(stored, turn)) < 1.5);
+  }
+}
+
 int segments_of(std::initializer_list<int> of_keyframes) {
   std::vector<FlightKeyframe> keyframes;
   for (const int segment : of_keyframes) {
@@ -667,6 +705,7 @@ int main() {
   RUN_TEST(test_csv_numbers_are_the_shortest_that_read_back);
   RUN_TEST(test_a_written_camera_reads_back_to_the_same_bits);
   RUN_TEST(test_matches_come_with_commas_blanks_and_names);
+  RUN_TEST(test_up_is_up_however_far_the_cameras_look_down);
   RUN_TEST(test_the_cloud_has_the_points_whose_rays_meet_at_an_angle);
   RUN_TEST(test_segments_are_counted_that_have_keyframes);
   RUN_TEST(test_the_font_gets_letters_that_it_has);

@@ -39,6 +39,7 @@ class FilmSource : public FrameSource {
     }
   }
 
+  int turn_deg() const override { return is_turned_ ? 0 : facts_.turn_deg; }
   void run(const Wanted& wanted, const Consumer& consume, const std::atomic<bool>& stop) override {
     Film film(file_, fps_);
     bool goes_on = true, gap = false;

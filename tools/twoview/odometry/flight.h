@@ -117,6 +117,8 @@ class Flight {
   const cv::Mat& picture() const { return picture_; }
   // Whether attitudes were given, so that the map's z axis points down.
   bool is_upright() const { return is_upright_; }
+  // By how much a viewer turns the frames clockwise, degrees.
+  int turn_deg() const { return source_.turn_deg(); }
   const tv_odometry_state& state() const { return state_; }
   // What was decided of the camera file: what was left out of it, and that it was scaled.
   const std::vector<std::string>& notes() const { return notes_; }

@@ -73,6 +73,9 @@ class FrameSource {
   virtual std::vector<std::string> notes() const { return {}; }
   // What a film's container says; empty for other sources.
   virtual std::optional<FilmFacts> film() const { return {}; }
+  // By how much a viewer turns the frames clockwise: 0, 90, 180 or 270 degrees. After run() for
+  // photographs.
+  virtual int turn_deg() const { return 0; }
   // The width of a pixel over its height.
   virtual double pixel_aspect() const { return 1; }
   // Fits a given camera and the pictures to each other where they are known to differ: a film that

@@ -57,6 +57,7 @@ class ImageFolder : public FrameSource {
  public:
   explicit ImageFolder(Folder folder) : folder_(std::move(folder)) {}
 
+  int turn_deg() const override { return is_turned_ ? 0 : turn_deg_; }
   void run(const Wanted& wanted, const Consumer& consume, const std::atomic<bool>& stop) override {
     for (size_t k = 0; k < folder_.frames.size() && !stop; ++k) {
       const Listed& listed = folder_.frames[k];

@@ -19,6 +19,7 @@
 #include "base/error.h"
 #include "odometry/assets.h"
 #include "odometry/outputs.h"
+#include "odometry/view.h"
 #include "pair/session.h"
 
 namespace cli {
@@ -207,7 +208,6 @@ void LivePage::update(const Flight& flight) {
   for (const tv_map_point& point : points) segments.insert(point.segment);
   json["num_segments"] = segments.size();
   json["unit"] = state.scale_source != TV_SCALE_UNIT ? "m" : "";
-  json["is_upright"] = flight.is_upright();
   json["width"] = flight.picture().cols;
   json["height"] = flight.picture().rows;
   json["tracks"] = s.tracks(flight, points);
@@ -220,7 +220,9 @@ void LivePage::update(const Flight& flight) {
     int32_t own = -1;
     if (position_of(flight, frames[k], t, &own) && own == segment) append(path, t);
   }
-  const std::vector<Rgb> colours = flight.colours(points, flight.keyframes());
+  const std::vector<FlightKeyframe> keyframes = flight.keyframes();
+  const std::vector<Rgb> colours = flight.colours(points, keyframes);
+  json["view"] = view_of(flight, keyframes, segment).view_from_world;
   const size_t every = points.size() / kMaxPoints + 1;
   for (size_t k = 0; k < points.size(); k += every) {
     if (points[k].segment != segment) continue;

@@ -136,6 +136,18 @@ std::unique_ptr<FrameSource> open_source(const Arguments& a) {
   throw BadInput("cannot read " + a.source + ": it is neither a folder, a film nor a camera");
 }
 
+// COLMAP ends a name of images.txt at its first blank (pycolmap 4.2.1, 2026-11-29).
+void note_blanks(const FlightResult& result, Common& common) {
+  for (const FlightKeyframe& key : result.keyframes) {
+    const std::string& name = result.flight->given(key.keyframe.frame).name;
+    if (name.find_first_of(" \t") == std::string::npos) continue;
+    common.note("'" + name +
+                "' has a blank, at which COLMAP ends a name of colmap/images.txt: rename the "
+                "pictures, or take colmap/sparse/, whose names have none");
+    return;
+  }
+}
+
 // The words of the progress line while the flight lasts.
 class FlightProgress {
  public:
@@ -543,6 +555,7 @@ int odometry(Arguments& a) {
   const bool has_map = !result.keyframes.empty();
   ColmapFolder colmap(files.folder() / "colmap", {camera_path(a.camera), truth_file}, has_map);
   if (has_map) colmap.add_model(result);
+  if (has_map) note_blanks(result, common);
   if (has_map && !a.leaves_pictures) {
     const Stopwatch watch(!common.quiet, "writing the pictures of the keyframes");
     for (const std::string& note : colmap.add_pictures(result, *source, stop)) common.note(note);

@@ -6,6 +6,7 @@
 
 #include "odometry/assets.h"
 #include "odometry/film_lens.h"
+#include "odometry/view.h"
 #include "pair/result.h"
 #include "report/assets.h"
 #include "report/html.h"
@@ -28,20 +29,23 @@ double six_digits(double value) {
   return std::atof(text);
 }
 
-// The axes of the page's view: x right, y down, z forward. A map whose z axis points down is turned
-// so that it stands upright.
+// The map as the page shows it: x right, y down, z ahead.
 class View {
  public:
-  explicit View(bool is_upright) : is_upright_(is_upright) {}
-  Vector3 operator()(const Vector3& v) const { return is_upright_ ? Vector3{v[1], v[2], v[0]} : v; }
-  Json axes() const { return is_upright_ ? Json{"y", "z", "x"} : Json{"x", "y", "z"}; }
+  explicit View(const FlightResult& result)
+      : view_(view_of(*result.flight, result.keyframes, result.segment)) {}
+  Vector3 operator()(const Vector3& v) const { return applied(view_.view_from_world, v); }
+  Json axes() const {
+    return view_.is_measured ? Json{"y", "z", "x"} : Json{"right", "down", "ahead"};
+  }
   Json numbers(const Vector3& v) const {
     const Vector3 seen = (*this)(v);
     return {six_digits(seen[0]), six_digits(seen[1]), six_digits(seen[2])};
   }
+  bool is_measured() const { return view_.is_measured; }
 
  private:
-  bool is_upright_;
+  MapView view_;
 };
 
 void append(Json& list, const Json& numbers) {
@@ -115,7 +119,7 @@ Json cameras_json(const FlightResult& result, const View& view) {
 }
 
 Json cloud_json(const FlightResult& result) {
-  const View view(result.flight->is_upright());
+  const View view(result);
   std::vector<size_t> chosen;
   for (const size_t k : cloud_points(result.points, result.keyframes))
     if (result.points[k].segment == result.segment) chosen.push_back(k);
@@ -258,6 +262,11 @@ std::string cloud_section(const FlightResult& result) {
   const std::string others = result.json["num_segments"].get<int>() > 1
                                  ? " Only the longest segment is shown: segments do not compare."
                                  : "";
+  const std::string up = View(result).is_measured()
+                             ? " Up is up by the measured attitudes."
+                             : " Up is estimated from how the camera was held, for this page "
+                               "alone: the files have the "
+                               "map's own axes, those of its first keyframe.";
   return "<section>\n<h2>Path and map</h2>\n<div class=\"stage\"><canvas id=\"cloud\"></canvas>\n"
          "<div class=\"buttons\"><button id=\"view-front\">front</button>"
          "<button id=\"view-side\">side</button><button id=\"view-top\">top</button></div></div>\n"
@@ -265,7 +274,7 @@ std::string cloud_section(const FlightResult& result) {
          "double "
          "click to start again. The path is yellow" +
          truth + "; the keyframe that is shown below is orange. Lengths are in " +
-         (is_metric ? "metres" : "distances of the first two keyframes") + "." + others +
+         (is_metric ? "metres" : "distances of the first two keyframes") + "." + others + up +
          "</p>\n</section>\n";
 }
 

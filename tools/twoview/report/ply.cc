@@ -7,7 +7,7 @@
 namespace cli {
 
 std::string ply_header(const std::vector<std::string>& comments, size_t num_points,
-                       const PlyColumns& columns) {
+                       const PlyColumns& columns, std::optional<size_t> num_triangles) {
   std::string text = "ply\nformat binary_little_endian 1.0\ncomment twoview " +
                      std::string(tv_version_string()) + "\n";
   for (const std::string& comment : comments) text += "comment " + comment + "\n";
@@ -16,6 +16,9 @@ std::string ply_header(const std::vector<std::string>& comments, size_t num_poin
     for (const char* name : names)
       text += std::string(type == PlyType::kFloat ? "property float " : "property uchar ") + name +
               "\n";
+  if (num_triangles)
+    text += "element face " + std::to_string(*num_triangles) +
+            "\nproperty list uchar int vertex_indices\n";
   return text + "end_header\n";
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -17,9 +18,11 @@ namespace cli {
 enum class PlyType { kFloat, kUchar };
 using PlyColumns = std::vector<std::pair<PlyType, std::vector<const char*>>>;
 
-// The header of a file of points; their bytes follow it. comments: lines without an end.
+// The header of a file of points, or of a surface with so many triangles; their bytes follow it:
+// the rows of the columns, then of each triangle a byte 3 and the indices of its corners, int32.
+// comments: lines without an end.
 std::string ply_header(const std::vector<std::string>& comments, size_t num_points,
-                       const PlyColumns& columns);
+                       const PlyColumns& columns, std::optional<size_t> num_triangles = {});
 
 // Appends the little-endian bytes of a float.
 void append_float(std::string& bytes, float value);

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/upright.h"
 #include "room_model/axes.h"
 #include "room_model/plan.h"
 
@@ -175,13 +176,9 @@ void RoomBuilder::find_up(RoomModel& model) const {
     model.up_source = "gravity";
     return;
   }
-  // People and drones hold a camera more or less level: its y axis points down on average.
-  Vector3 sum{0, 0, 0};
-  for (const RoomView& view : scene_.views)
-    for (size_t axis = 0; axis < 3; ++axis) sum[axis] -= view.R[3 * axis + 1];
-  const double length = norm(sum);
-  if (length > 0)
-    for (size_t axis = 0; axis < 3; ++axis) model.up[axis] = sum[axis] / length;
+  std::vector<Matrix3> held;
+  for (const RoomView& view : scene_.views) held.push_back(view.R);
+  model.up = up_of_cameras(held);
   model.up_source = "cameras";
   // Floor, ceiling and tables say it better where they were measured.
   constexpr double kMostCosine = 0.94;  // of 20 degrees

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "report/tables.h"
+#include "report/ply.h"
 #include "twoview/version.h"
 
 namespace cli {
@@ -67,18 +67,15 @@ class Buffer {
 }  // namespace
 
 std::string room_ply(const RoomModel& model, const std::string& unit) {
-  std::string bytes = "ply\nformat binary_little_endian 1.0\ncomment twoview " +
-                      std::string(tv_version_string()) +
-                      "\ncomment the world of the trajectory; unit: " + unit +
-                      "\ncomment sigma: standard deviation along the normal; inferred 1: no view "
-                      "measured it\nelement vertex " +
-                      std::to_string(model.vertices.size()) +
-                      "\nproperty float x\nproperty float y\nproperty float z\n"
-                      "property float nx\nproperty float ny\nproperty float nz\n"
-                      "property uchar red\nproperty uchar green\nproperty uchar blue\n"
-                      "property float sigma\nproperty uchar inferred\nelement face " +
-                      std::to_string(model.triangles.size()) +
-                      "\nproperty list uchar int vertex_indices\nend_header\n";
+  std::string bytes =
+      ply_header({"the world of the trajectory; unit: " + unit,
+                  "sigma: standard deviation along the normal; inferred 1: no view measured it"},
+                 model.vertices.size(),
+                 {{PlyType::kFloat, {"x", "y", "z", "nx", "ny", "nz"}},
+                  {PlyType::kUchar, {"red", "green", "blue"}},
+                  {PlyType::kFloat, {"sigma"}},
+                  {PlyType::kUchar, {"inferred"}}},
+                 model.triangles.size());
   bytes.reserve(bytes.size() + 32 * model.vertices.size() + 13 * model.triangles.size());
   for (const tv_room_vertex& v : model.vertices) {
     for (const float value : v.position) append_float(bytes, value);
