@@ -192,6 +192,20 @@ class Report(unittest.TestCase):
                 self.assertLess(row["pose_error_deg"], 0.5, row)
                 self.assertEqual(row["num_matches"], 200)
             self.assertEqual(rows["triangulation"]["twoview_linear_ls"]["status"], "ok")
+            # A mask leaves out your matches on its black pixels, too.
+            import cv2
+            mask = np.full((500, 741), 255, np.uint8)
+            mask[:, :400] = 0
+            cv2.imwrite(os.path.join(folder, "mask.png"), mask)
+            masked = support.run(*words[:3], "-o", os.path.join(folder, "masked"), "--quiet",
+                                 "--systems", "twoview_five_point", "--matches",
+                                 os.path.join(folder, "net"), "--matches-resize", 741 // 2 + 1,
+                                 "--mask", os.path.join(folder, "mask.png"))
+            self.assertEqual(masked.returncode, 0, masked.stderr)
+            with open(os.path.join(folder, "masked", "report.json"), encoding="utf-8") as f:
+                row = json.load(f)["pairs"][0]["rows"]["pipeline"]["net"]
+            self.assertEqual(row["num_matches"],
+                             int(((left[:, 0] > 399.5) & (right[:, 0] > 399.5)).sum()))
             with open(os.path.join(out, "index.html"), encoding="utf-8") as f:
                 page = f.read()
             self.assertIn("Solvers on identical matches, those of net", page)

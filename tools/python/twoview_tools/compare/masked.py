@@ -19,6 +19,14 @@ def used_pixels(mask, shape):
     return cv2.resize(used, shape[::-1], interpolation=cv2.INTER_AREA) == 255
 
 
+def kept_by_mask(points, used):
+    """(n,) bool: which points (n, 2) lie on pixels that are used; all where `used` is None."""
+    if used is None or not len(points):
+        return np.ones(len(points), bool)
+    x, y = (np.clip(np.rint(points[:, k]).astype(int), 0, used.shape[1 - k] - 1) for k in (0, 1))
+    return used[y, x]
+
+
 def write_masks(folder, used):
     """Writes masks as COLMAP looks for them, NAME.png. used: {name: (height, width) bool or None}.
     Returns the folder, "" where there are none."""

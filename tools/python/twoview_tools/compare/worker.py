@@ -22,7 +22,7 @@ import numpy as np
 
 from ..accuracy import datasets, estimators
 from . import systems
-from .masked import used_pixels
+from .masked import kept_by_mask, used_pixels
 
 
 GRAVITY_SIGMA_RAD = np.radians(0.5)  # error of the gravity taken from a reference pose
@@ -175,7 +175,9 @@ def run_own(views, options, task):
     own_matches.require_pixels(whole, matched, options["file"], may_be_smaller=resize is None)
     scaled = [(p + 0.5) * (np.array(size) / was) - 0.5
               for p, size, was in zip(pixels, views.sizes, matched)]
-    matches = views.matches(*scaled, given.ratios)
+    kept = np.logical_and(*(kept_by_mask(p, used) for p, used in zip(scaled, views.used)))
+    matches = views.matches(*(p[kept] for p in scaled),
+                            None if given.ratios is None else given.ratios[kept])
     context = twoview_context(64, 64, max(8192, 1 << (len(given) - 1).bit_length()))
     watch = Stopwatch()
     R, t, inliers, found = estimators.run_twoview(context, matches, None, task["seed"])
