@@ -309,6 +309,17 @@ class Mavlink(unittest.TestCase):
         (cut / "frames.txt").write_text("")
         self.assert_refused(run("drone", "replay", cut), "is empty")
 
+    def test_a_clock_that_was_set_back_is_named_by_its_line(self):
+        back = self.folder / "back"
+        shutil.copytree(self.recording, back)
+        lines = (back / "frames.txt").read_text().splitlines()
+        middle = len(lines) // 2
+        for number, words in ((middle + 1, "set back"), (1, "is no frame")):
+            changed = list(lines)
+            changed[number - 1] = lines[0] if words == "set back" else "1.5 0 0 1"
+            (back / "frames.txt").write_text("\n".join(changed) + "\n")
+            self.assert_refused(run("drone", "replay", back), f"line {number}", words)
+
 
 if __name__ == "__main__":
     unittest.main(verbosity=2)

@@ -7,6 +7,8 @@
 #include <filesystem>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
+#include <sstream>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -72,15 +74,28 @@ struct FrameLine {
   uint64_t number = 0;
 };
 
+// The lines of a recording's frames.txt. A recording that was cut off may end within a line, which
+// is left out; any other line that is no frame, or not later than the one before, is an error.
 std::vector<FrameLine> read_frame_lines(const fs::path& path) {
   std::ifstream file(path);
   std::vector<FrameLine> lines;
-  long long host = 0, device = 0;
-  unsigned long long number = 0;
-  int key = 0;
-  while (file >> host >> device >> number >> key) {
-    if (host < 0 || host > INT64_MAX / 4 || (!lines.empty() && host <= lines.back().time_ns)) break;
-    lines.push_back({host, number});
+  std::string text;
+  for (int number = 1; std::getline(file, text) && !file.eof(); ++number) {
+    const auto refuse = [&](const char* what) {
+      throw BadInput(path.string() + ": line " + std::to_string(number) + " " + what);
+    };
+    std::istringstream words(text);
+    long long host = 0, device = 0;
+    unsigned long long picture = 0;
+    int key = 0;
+    if (!(words >> host >> device >> picture >> key) || host < 0 || host > INT64_MAX / 4) {
+      refuse("is no frame: host time, device time, number, key");
+    }
+    if (!lines.empty() && host <= lines.back().time_ns) {
+      refuse("has a host time that is not later than that of the line before: the clock of the "
+             "recording computer was set back");
+    }
+    lines.push_back({host, picture});
   }
   return lines;
 }

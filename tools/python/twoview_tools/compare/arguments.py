@@ -72,8 +72,8 @@ def make_parser():
                              f"{RESIZE_LONG_SIDE} for those with a longer "
                              f"side than {MAX_NATIVE_SIDE})")
     parser.add_argument("--mask", default="", metavar="FILE|DIR",
-                        help="which pixels show the scene: one image for all, black where a picture "
-                             "is left out, or a folder of masks NAME.png; for every system")
+                        help="which pixels show the scene: one image for all, black where a "
+                             "picture is left out, or a folder of masks NAME.png; for every system")
     parser.add_argument("--seed", type=int, default=0, metavar="N")
     parser.add_argument("--max-pairs", type=int, default=0, metavar="N",
                         help="at most N pairs of each list, evenly spaced")
