@@ -125,15 +125,13 @@ class RoomTest(CliTest):
         self.assertGreater(len(faces), 2000)
         self.assertEqual(sorted(set(index for face in faces for index in face)),
                          list(range(len(vertices))), "each vertex is of a triangle")
-        scale, right, normals = self.scale(), 0, 0
+        scale, normals = self.scale(), 0
+        # The camera's path is along x of the first camera, to within the odometry's error.
+        self.assert_walls(self.out, scale)
         for v in vertices:
-            # The camera's path is along x of the first camera, to within the odometry's error.
-            off = min(abs(scale * v["z"] - depth) / depth for depth in DEPTHS)
-            right += off < 0.03
             normals += v["nz"] < -0.5  # towards the camera
             self.assertAlmostEqual(math.hypot(v["nx"], v["ny"], v["nz"]), 1, 3)
             self.assertGreater(v["sigma"], 0)
-        self.assertGreater(right / len(vertices), 0.85)
         self.assertGreater(normals / len(vertices), 0.85)
         nearest = {min(DEPTHS, key=lambda depth: abs(scale * v["z"] - depth)) for v in vertices}
         self.assertGreaterEqual(len(nearest), 4, "nearly all of the walls are there")
@@ -253,6 +251,76 @@ class RoomTest(CliTest):
         self.assertGreater(float(sigma), 0)
         self.assertIn("not the metre", found["readout"])
 
+    # -- other sources of poses -----------------------------------------------------------------
+
+    def assert_walls(self, out, scale, share=0.85):
+        """Most vertices lie on a wall; scale: units of the truth in one of the file's."""
+        _, vertices, _ = read_ply(out / "room.ply")
+        right = sum(min(abs(scale * v["z"] - depth) / depth for depth in DEPTHS) < 0.03
+                    for v in vertices)
+        self.assertGreater(right / len(vertices), share)
+
+    def test_poses_of_a_file_serve_as_well(self):
+        self.succeed(self.room("--poses", self.source / "groundtruth.txt", folder=self.source))
+        self.assert_walls(self.out, 1)
+        self.assertEqual(self.result()["options"]["poses"], str(self.source / "groundtruth.txt"))
+
+    def test_a_model_of_colmap_and_its_pictures_serve_as_well(self):
+        model = self.folder / "model"
+        shutil.copytree(self.flight / "colmap", model)
+        pictures = self.folder / "pictures"
+        shutil.copytree(self.source / "images", pictures / "images")
+        # COLMAP's names are relative to the folder of the pictures.
+        images = (model / "images.txt").read_text()
+        self.assertIn(" images/", images)
+        (model / "images.txt").write_text(images.replace(" images/", " "))
+        self.succeed(self.room("--source", pictures / "images", folder=model))
+        self.assert_walls(self.out, self.scale())
+        other = self.folder / "other"
+        self.assert_refused(self.room(folder=model, out=other), "--source is required", out=other)
+        self.assert_refused(self.room("--source", self.folder, folder=model, out=other),
+                            "none of the pictures", out=other)
+        (model / "cameras.txt").write_text("1 PINHOLE 320 240 300 300 160 120\n"
+                                           "2 PINHOLE 320 240 300 300 160 120\n")
+        self.assert_refused(self.room("--source", pictures / "images", folder=model, out=other),
+                            "2 cameras", out=other)
+
+    def test_frames_without_poses_are_refused(self):
+        self.assert_refused(self.room(folder=self.source), "--poses is required")
+        late = self.write("late.txt", "1000 0 0 0 0 0 0 1\n1001 1 0 0 0 0 0 1\n")
+        self.assert_refused(self.room("--poses", late, folder=self.source), "no pose has the time")
+        self.write("binary/images.bin", b"x")
+        self.assert_refused(self.room(folder=self.folder / "binary"), "model_converter")
+
+    # -- what cannot make a room ------------------------------------------------------------------
+
+    def test_a_turn_on_the_spot_measures_nothing_and_says_so(self):
+        still = self.write("still.txt", "".join(f"{t:.9f} 0 0 0 0 0 0 1\n" for t in TIMES))
+        done = self.room("--poses", still, folder=self.source)
+        self.assertEqual(done.returncode, 3)
+        self.one_line(done, "no surface")
+        room = self.result()["room"]
+        self.assertEqual((room["keyframes_used"], room["num_triangles"]), (0, 0))
+        self.assertGreater(room["pixels"]["seen_from_one_place"], 0.5)
+        self.assertEqual(self.listing(), ["report.html", "result.json"])
+
+    def test_pictures_without_texture_measure_nothing_and_say_so(self):
+        plain = self.folder / "plain"
+        shutil.copytree(self.source, plain)
+        for i in range(COUNT):
+            (plain / f"images/{i:05}.png").write_bytes(png(320, 240, bytes([90]) * (320 * 240)))
+        done = self.room("--poses", plain / "groundtruth.txt", folder=plain)
+        self.assertEqual(done.returncode, 3)
+        self.one_line(done, "no surface")
+        self.assertGreater(self.result()["room"]["pixels"]["no_texture"], 0.95)
+        self.assertIn("without texture", (self.out / "report.html").read_text())
+
+    def test_a_single_pose_has_no_partner(self):
+        one = self.write("one.txt", f"{TIMES[3]:.9f} 0 0 0 0 0 0 1\n")
+        done = self.room("--poses", one, folder=self.source)
+        self.assertEqual(done.returncode, 3)
+        self.one_line(done, "no surface")
+
     # -- memory and voxels --------------------------------------------------------------------
 
     def test_a_room_that_does_not_fit_gets_coarser_and_says_so(self):
@@ -266,7 +334,8 @@ class RoomTest(CliTest):
     # -- bad input ----------------------------------------------------------------------------
 
     def test_a_folder_that_odometry_did_not_write(self):
-        self.assert_refused(self.room(folder=self.source), "result.json")
+        self.write("none/readme.txt", "nothing")
+        self.assert_refused(self.room(folder=self.folder / "none"), "result.json")
         self.write("other/result.json", '{"R": null}')
         self.assert_refused(self.room(folder=self.folder / "other"), "not of twoview odometry")
         self.write("other/result.json", "no json")

@@ -107,6 +107,11 @@ class ImageFolder : public FrameSource {
     for (const Listed& listed : folder_.frames) times.push_back(listed.time_s);
     return times;
   }
+  std::vector<std::string> names() const override {
+    std::vector<std::string> names;
+    for (const Listed& listed : folder_.frames) names.push_back(listed.name);
+    return names;
+  }
   std::optional<std::array<double, 12>> body_from_camera() const override {
     return folder_.body_from_camera;
   }

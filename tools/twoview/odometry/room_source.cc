@@ -10,8 +10,10 @@
 #include "base/output.h"
 #include "files/camera_formats.h"
 #include "files/image_file.h"
+#include "odometry/accuracy.h"
 #include "odometry/numbers.h"
 #include "odometry/stored_source.h"
+#include "room_model/posed_points.h"
 
 namespace cli {
 namespace {
@@ -179,6 +181,7 @@ RoomSource room_source_of_flight(const std::string& folder, const std::string& m
   }
   if (made.scene.views.empty()) throw BadInput(folder + " has no frame with a pose");
   made.scene.points = read_colmap_points(file("colmap/points3D.txt"));
+  made.scene.is_upright_by_frames = true;
   made.scene.is_metric = text_of(json.value("scale", Json())) == "metric";
   if (made.scene.is_metric) made.scene.scale_sigma = number_of(json, "scale_sigma", 0.0);
   const SourceFrame first = first_frame(*made.source, indices);
@@ -199,6 +202,136 @@ RoomSource room_source_of_flight(const std::string& folder, const std::string& m
   for (const char* name : {"result.json", "keyframes.txt", "trajectory.txt", "frames.csv"})
     made.files.push_back(file(name));
   return made;
+}
+
+RoomSource room_source_of_poses(const std::string& path, const std::string& poses,
+                                const std::string& camera, double fps) {
+  RoomSource made;
+  made.given = path;
+  made.source = open_stored_source(path, fps, true, camera);
+  if (!made.source)
+    throw BadInput("cannot read " + path + ": it is neither a folder of frames nor a film");
+  FrameSource& source = *made.source;
+  std::optional<tv_camera> given;
+  if (!camera.empty()) {
+    given = load_camera_file(camera).of("");
+    source.fit(*given);
+    made.files.push_back(camera_path(camera));
+  }
+  // The frames' times. Those of a film are known only once it is read.
+  Trajectory frames;
+  std::vector<int> indices;
+  std::vector<double> times = source.times();
+  for (size_t k = 0; k < times.size(); ++k) indices.push_back(static_cast<int>(k));
+  if (times.empty()) {
+    const std::atomic<bool> never{false};
+    source.run([](int) { return true; },
+               [&](const SourceFrame& frame) {
+                 times.push_back(frame.time_s);
+                 indices.push_back(frame.index);
+                 return true;
+               },
+               never);
+  }
+  for (const double time : times) frames.push_back({time, {}});
+  const Trajectory path_of_file = load_trajectory(poses, times, source.body_from_camera()).poses;
+  const std::vector<std::string> names = source.names();
+  std::set<int> wanted;
+  for (const Association& pair : associated(frames, path_of_file)) {
+    const int index = indices[pair.idx_estimate];
+    const Pose& pose = path_of_file[pair.idx_truth].pose;
+    const std::string name = pair.idx_estimate < names.size() ? names[pair.idx_estimate]
+                                                              : "frame " + std::to_string(index);
+    made.scene.views.push_back({index, name, pose.R, pose.t, true});
+    wanted.insert(index);
+  }
+  if (made.scene.views.empty())
+    throw BadInput(poses + ": no pose has the time of a frame (within 0.01 s)");
+  const SourceFrame first = first_frame(source, wanted);
+  if (!given) given = source.camera(first, first.luma.cols, first.luma.rows);
+  if (!given) throw BadInput("--camera is required: " + source.kind() + " does not describe it");
+  require_size(*given, camera.empty() ? path : camera, first.luma.cols, first.luma.rows,
+               first.name);
+  made.scene.camera = *given;
+  made.name = fs::absolute(fs::path(path) / "x").parent_path().filename().string();
+  for (const std::string& name : source.files()) made.files.push_back(name);
+  made.files.push_back(poses);
+  made.notes.emplace_back(
+      "the unit is that of the poses: whether it is the metre is not known here");
+  return made;
+}
+
+RoomSource room_source_of_colmap(const std::string& model, const std::string& pictures) {
+  const fs::path root = model;
+  const auto file = [&root](const char* name) { return (root / name).string(); };
+  RoomSource made;
+  made.given = pictures;
+  made.name = fs::absolute(fs::path(pictures) / "x").parent_path().filename().string();
+  const CameraFile cameras = load_camera_file(file("cameras.txt"));
+  if (cameras.cameras.size() != 1)
+    throw BadInput(file("cameras.txt") + " has " + std::to_string(cameras.cameras.size()) +
+                   " cameras: a room is made of pictures of one");
+  made.scene.camera = cameras.cameras[0].second;
+  made.scene.is_flight = false;
+  made.source = open_image_folder(pictures, 1, false);
+  std::map<std::string, int> indices;
+  const std::vector<std::string> names = made.source->names();
+  for (size_t k = 0; k < names.size(); ++k) indices[names[k]] = static_cast<int>(k);
+  // Two lines an image; the second one, of its points, may be empty.
+  const std::string text = read_file(file("images.txt"), kMaxFileBytes);
+  std::vector<RoomView> views;
+  int number = 0, missing = 0;
+  bool is_pose = true;
+  for (size_t at = 0; at < text.size();) {
+    const size_t end = std::min(text.find('\n', at), text.size());
+    const std::string line = text.substr(at, end - at);
+    at = end + 1;
+    ++number;
+    if (!line.empty() && line[0] == '#') continue;
+    is_pose = !is_pose;
+    if (is_pose) continue;
+    const std::vector<std::string_view> words = words_of(line);
+    double n[9];
+    bool good = words.size() >= 10;
+    for (size_t k = 0; good && k < 9; ++k) good = to_number(words[k], n[k]);
+    if (!good)
+      throw BadInput(file("images.txt") + ": line " + std::to_string(number) + " is no pose");
+    const std::string name(line.substr(static_cast<size_t>(words[9].data() - line.data())));
+    const auto found = indices.find(name.substr(0, name.find_last_not_of("\r ") + 1));
+    if (found == indices.end()) {
+      ++missing;
+      continue;
+    }
+    const Pose pose = inverse({rotation_of_quaternion(n[2], n[3], n[4], n[1]), {n[5], n[6], n[7]}});
+    views.push_back({found->second, found->first, pose.R, pose.t, true});
+  }
+  if (views.empty())
+    throw BadInput("none of the pictures of " + file("images.txt") + " is in " + pictures);
+  if (missing > 0)
+    made.notes.push_back(std::to_string(missing) + " pictures of the model are not in " + pictures);
+  std::sort(views.begin(), views.end(),
+            [](const RoomView& a, const RoomView& b) { return a.index < b.index; });
+  made.scene.views = std::move(views);
+  made.scene.points = read_colmap_points(file("points3D.txt"));
+  for (const char* name : {"cameras.txt", "images.txt", "points3D.txt"})
+    made.files.push_back(file(name));
+  return made;
+}
+
+void add_posed_points(RoomSource& from, const std::atomic<bool>& stop) {
+  RoomScene& scene = from.scene;
+  std::map<int, size_t> views;
+  for (size_t k = 0; k < scene.views.size(); ++k) views[scene.views[k].index] = k;
+  PosedPoints points(scene);
+  const cv::Size size(scene.camera.width, scene.camera.height);
+  from.source->run([&](int index) { return views.count(index) != 0 && points.wants(views[index]); },
+                   [&](const SourceFrame& frame) {
+                     if (frame.luma.size() == size)
+                       points.add(views.at(frame.index), frame.luma, {});
+                     return true;
+                   },
+                   stop);
+  scene.points = points.points();
 }
 
 RoomScene room_scene(const FlightResult& result) {
@@ -231,7 +364,7 @@ void read_room_pictures(FrameSource& source, const Masks& masks, const cv::Mat& 
   const RoomScene& scene = builder.scene();
   std::map<int, size_t> views;
   for (size_t k = 0; k < scene.views.size(); ++k) views[scene.views[k].index] = k;
-  const cv::Size size(scene.camera.width, scene.camera.height);
+  const cv::Size size = builder.picture_size();
   cv::Mat still;
   if (!tracked_still.empty()) cv::resize(tracked_still, still, size, 0, 0, cv::INTER_NEAREST);
   int num_used = 0;
@@ -242,18 +375,19 @@ void read_room_pictures(FrameSource& source, const Masks& masks, const cv::Mat& 
   };
   const auto consume = [&](const SourceFrame& frame) {
     RoomPicture picture;
-    if (frame.luma.size() == size) {
-      ++num_used;
+    try {
+      if (frame.luma.empty()) throw BadInput(frame.problem);
+      if (frame.luma.size() != size) throw BadInput(frame.name + " is of another size");
+      picture.mask = masks.of(frame.name, size.width, size.height);
+      if (!still.empty()) picture.mask = picture.mask.empty() ? still : picture.mask & still;
       picture.luma = frame.luma;
       if (frame.colour.type() == CV_8UC3 && frame.colour.size() == size)
         picture.colour = frame.colour;
-      picture.mask = masks.of(frame.name, size.width, size.height);
-      if (!still.empty()) picture.mask = picture.mask.empty() ? still : picture.mask & still;
-    } else if (problem.empty()) {
-      problem = frame.luma.empty() ? frame.problem : frame.name + " is of another size";
+      ++num_used;
+    } catch (const BadInput& e) {  // a picture that cannot be used is a missing one
+      if (problem.empty()) problem = e.what();
     }
-    // The odometry's world has its z axis down where attitudes were given to it.
-    if (frame.world_from_cam) builder.set_gravity({0, 0, 1});
+    if (scene.is_upright_by_frames && frame.world_from_cam) builder.set_gravity({0, 0, 1});
     builder.add_picture(views.at(frame.index), picture);
     if (after_picture) after_picture();
     return true;

@@ -29,6 +29,18 @@ struct RoomSource {
 // its result.json says. Throws BadInput.
 RoomSource room_source_of_flight(const std::string& folder, const std::string& moved_to);
 
+// A folder of frames, or a film, with the poses of a file (TUM, EuRoC or KITTI, world_from_cam).
+// camera: a file; empty: what the source says of it. fps: of images without times, 0: not given.
+RoomSource room_source_of_poses(const std::string& source, const std::string& poses,
+                                const std::string& camera, double fps);
+
+// A model of COLMAP as text (cameras.txt, images.txt, points3D.txt) of one camera, and the folder
+// of its pictures.
+RoomSource room_source_of_colmap(const std::string& model, const std::string& pictures);
+
+// Finds points for a scene without any, by matching its pictures.
+void add_posed_points(RoomSource& from, const std::atomic<bool>& stop);
+
 // The scene of a flight that has just ended: its longest segment.
 RoomScene room_scene(const FlightResult& result);
 

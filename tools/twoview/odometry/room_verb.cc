@@ -20,7 +20,8 @@ namespace {
 
 struct Arguments {
   Common common;
-  std::string folder, source;
+  std::string folder, source, poses, camera;
+  double fps = 0;
   RoomSettings settings;
 };
 
@@ -37,10 +38,39 @@ std::string summary(const RoomSource& from, const RoomModel& model, const Output
                              model.depth_maps.empty() ? "" : " depth/");
 }
 
+// What FOLDER is: frames whose poses --poses gives, a model of COLMAP, or a flight's results.
+RoomSource source_of(const Arguments& a, const std::atomic<bool>& stop) {
+  if (!a.poses.empty()) {
+    if (!a.source.empty())
+      throw BadInput("--source is for the results of twoview odometry and models of COLMAP");
+    RoomSource from = room_source_of_poses(a.folder, a.poses, a.camera, a.fps);
+    const Stopwatch watch(!a.common.quiet, "room: matching pictures for the range of depth");
+    add_posed_points(from, stop);
+    return from;
+  }
+  if (!a.camera.empty() || a.fps > 0) throw BadInput("--camera and --fps are for --poses");
+  std::error_code error;
+  const std::filesystem::path folder = a.folder;
+  const bool is_flight = std::filesystem::exists(folder / "result.json", error);
+  if (!is_flight && std::filesystem::exists(folder / "images.txt", error)) {
+    if (a.source.empty())
+      throw BadInput("--source is required: the folder of the pictures of the model " + a.folder);
+    return room_source_of_colmap(a.folder, a.source);
+  }
+  if (!is_flight && std::filesystem::exists(folder / "images.bin", error))
+    throw BadInput(a.folder +
+                   " is a binary model of COLMAP: make it text with colmap model_converter "
+                   "--output_type TXT");
+  if (!is_flight && std::filesystem::exists(folder / "frames.txt", error))
+    throw BadInput("--poses is required: " + a.folder +
+                   " holds frames without poses (or run twoview odometry first)");
+  return room_source_of_flight(a.folder, a.source);
+}
+
 int room(Arguments& a) {
   Common& common = a.common;
   const std::atomic<bool>& stop = stop_flag_for_signals();
-  RoomSource from = room_source_of_flight(a.folder, a.source);
+  RoomSource from = source_of(a, stop);
   OutputSet files(common.output);
   for (const std::string& name : from.files) files.keep(name);
   std::vector<std::string> names = kRoomFiles;
@@ -63,6 +93,8 @@ int room(Arguments& a) {
   json["interrupted"] = stop.load();
   json["options"] = room_options_json(a.settings);
   json["options"]["folder"] = a.folder;
+  json["options"]["poses"] = nullptr;
+  if (!a.poses.empty()) json["options"]["poses"] = a.poses;
   json["version"] = tv_version_string();
   files.add("result.json", json_text(json));
   files.add("report.html", room_report(from.scene, model, from.name, common.notes, json));
@@ -85,12 +117,24 @@ void add_room(CLI::App& program, Run& run) {
   auto a = std::make_shared<Arguments>();
   CLI::App* verb = program.add_subcommand(
       "room", "the surface of a room, of the pictures and poses of a flight");
-  verb->add_option("FOLDER", a->folder, "what twoview odometry wrote of the flight")
+  verb->add_option("FOLDER", a->folder,
+                   "what twoview odometry wrote of the flight; frames, with --poses; a model of "
+                   "COLMAP as text, with --source")
       ->required()
       ->type_name("FOLDER");
   verb->add_option("--source", a->source,
-                   "where the flight's pictures lie now; without: where they lay then")
+                   "where the flight's pictures lie now; without: where they lay then; of a model "
+                   "of COLMAP: its pictures")
       ->type_name("SOURCE");
+  verb->add_option("--poses", a->poses,
+                   "poses world_from_cam of the frames: TUM, EuRoC or KITTI; FOLDER is then a "
+                   "folder of frames or a film, as for odometry")
+      ->type_name("FILE");
+  verb->add_option("--camera", a->camera, "camera file, with --poses; without: what FOLDER says")
+      ->type_name("FILE");
+  add_number(*verb, "fps", &a->fps, 0.001, 10000,
+             "frames a second, with --poses, of images without times")
+      ->default_str("");
   add_room_options(*verb, a->settings);
   add_common(*verb, a->common, 0, "folder for the results");
   verb->final_callback([a, &run] { run = [a] { return room(*a); }; });

@@ -86,4 +86,29 @@ Features extract(tv_context* context, const Picture& picture, const Options& opt
   return features;
 }
 
+namespace {
+
+tv_features view_of(const Features& found) {
+  tv_features features;
+  tv_features_init(&features);
+  features.num = static_cast<int32_t>(found.keypoints.size());
+  features.keypoints = found.keypoints.data();
+  features.descriptors = found.descriptors.data();
+  return features;
+}
+
+}  // namespace
+
+std::vector<tv_correspondence> match_features(tv_context* context, const Features& f0,
+                                              const Features& f1, const tv_match_options& options) {
+  std::vector<tv_correspondence> matches(std::min(f0.keypoints.size(), f1.keypoints.size()) + 1);
+  int32_t count = 0;
+  const tv_features features0 = view_of(f0), features1 = view_of(f1);
+  check(tv_match(context, &features0, &features1, &options, matches.data(),
+                 static_cast<int32_t>(matches.size()), &count),
+        "cannot match");
+  matches.resize(static_cast<size_t>(count));
+  return matches;
+}
+
 }  // namespace cli

@@ -49,5 +49,7 @@ struct Features {
   std::vector<uint8_t> descriptors;
 };
 Features extract(tv_context* context, const Picture& picture, const Options& options);
+std::vector<tv_correspondence> match_features(tv_context* context, const Features& f0,
+                                              const Features& f1, const tv_match_options& options);
 
 }  // namespace cli

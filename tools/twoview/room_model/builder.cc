@@ -5,8 +5,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include <opencv2/imgproc.hpp>
+
 #include "base/error.h"
 #include "base/upright.h"
+#include "files/camera_file.h"
+#include "files/image_file.h"
 #include "room_model/axes.h"
 #include "room_model/plan.h"
 
@@ -39,6 +43,26 @@ double two_digits(double value) {
   return std::round(value / unit) * unit;
 }
 
+// Pictures are kept and compared at this longer side at most: three times that of a depth map.
+constexpr int kLongerSide = 960;
+
+RoomScene with_small_pictures(RoomScene scene) {
+  const cv::Size size = shrunk_size({scene.camera.width, scene.camera.height}, kLongerSide);
+  scene.camera = resized(scene.camera, size.width, size.height);
+  return scene;
+}
+
+// A copy, of its own memory, at that size.
+cv::Mat small_copy(const cv::Mat& picture, const tv_camera& camera, int interpolation) {
+  const cv::Size size(camera.width, camera.height);
+  cv::Mat copy;
+  if (picture.empty() || picture.size() == size)
+    copy = picture.clone();
+  else
+    cv::resize(picture, copy, size, 0, 0, interpolation);
+  return copy;
+}
+
 // The vertices of pieces that tv_room_mesh leaves out stay in its list.
 void leave_out_loose_vertices(RoomMesh& mesh) {
   std::vector<int32_t> renamed(mesh.vertices.size(), -1);
@@ -58,7 +82,8 @@ void leave_out_loose_vertices(RoomMesh& mesh) {
 }  // namespace
 
 RoomBuilder::RoomBuilder(RoomScene scene, const RoomSettings& settings)
-    : scene_(std::move(scene)),
+    : picture_size_(scene.camera.width, scene.camera.height),
+      scene_(with_small_pictures(std::move(scene))),
       settings_(settings),
       sweep_(scene_.camera),
       uses_(scene_.views.size()) {
@@ -97,11 +122,10 @@ RoomBuilder::RoomBuilder(RoomScene scene, const RoomSettings& settings)
 void RoomBuilder::add_picture(size_t k, const RoomPicture& picture) {
   if (k > 0) run_until(k - 1);
   if (wants(k)) {
-    pictures_[k] = picture;
     // The source may use its memory again for the next picture.
-    pictures_[k].luma = picture.luma.clone();
-    pictures_[k].colour = picture.colour.clone();
-    pictures_[k].mask = picture.mask.clone();
+    pictures_[k] = {small_copy(picture.luma, scene_.camera, cv::INTER_AREA),
+                    small_copy(picture.colour, scene_.camera, cv::INTER_AREA),
+                    small_copy(picture.mask, scene_.camera, cv::INTER_NEAREST)};
   }
   run_until(k);
 }

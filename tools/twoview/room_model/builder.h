@@ -24,7 +24,10 @@ class RoomBuilder {
 
   size_t num_keyframes() const { return jobs_.size(); }
   size_t num_done() const { return next_job_; }
+  // As it was given, but for the camera, which is that of pictures that are scaled down.
   const RoomScene& scene() const { return scene_; }
+  // Of the pictures as they are given.
+  cv::Size picture_size() const { return picture_size_; }
   // For what becomes known only while the pictures are read.
   void set_gravity(const Vector3& down) { scene_.gravity = down; }
 
@@ -53,6 +56,7 @@ class RoomBuilder {
   void add_depth_maps(RoomModel& model);
   void add_free_area(RoomModel& model);
 
+  cv::Size picture_size_;
   RoomScene scene_;
   RoomSettings settings_;
   DepthSweep sweep_;

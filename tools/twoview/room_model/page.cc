@@ -80,8 +80,7 @@ std::string cards(const RoomScene& scene, const RoomModel& model, const RoomPlan
       card(formatted("%.2f", model.size[0]) + " x " + formatted("%.2f", model.size[1]) + " x " +
                formatted("%.2f", model.size[2]),
            unit, "length, width, height" + words, "card wide");
-  text += card(formatted("%.1f", plan.area), scene.is_metric ? "m2" : "",
-               "of floor that is free or stands under furniture" + words);
+  text += card(formatted("%.1f", plan.area), scene.is_metric ? "m2" : "", "of floor" + words);
   text += card(std::to_string(model.triangles.size()), "", "triangles");
   text += card(formatted("%.3g", model.voxel), unit, "side of a voxel" + words);
   text += card(std::to_string(model.keyframes_used), "", "keyframes with a depth map");

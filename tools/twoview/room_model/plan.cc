@@ -12,7 +12,7 @@ namespace cli {
 namespace {
 
 constexpr int kFewestRays = 3;          // through a cell that is free: single ones may be wrong
-constexpr double kLeastPart = 0.05;     // of the largest free area, for another one to count
+constexpr double kLeastPart = 0.05;     // of the largest piece of floor, for another one to count
 constexpr double kUprightNormal = 0.3;  // the most of a normal's length along `up`: 17 degrees
 
 Vector3 position_of(const tv_room_vertex& v) {
@@ -79,21 +79,69 @@ void add_lines(const RoomModel& model, RoomPlan& plan) {
   }
 }
 
-void add_free_area(const RoomModel& model, RoomPlan& plan) {
+// 255 in each cell from which a wall is met in three of the four directions along the axes.
+cv::Mat between_walls(const RoomModel& model, const RoomPlan& plan) {
+  cv::Mat walls = cv::Mat::zeros(model.free_cells.size(), CV_8U);
+  for (const PlanLine& line : plan.lines)
+    if (line.is_wall)
+      cv::line(walls, cv::Point((line.a - model.free_origin) / model.free_cell),
+               cv::Point((line.b - model.free_origin) / model.free_cell), 255);
+  cv::Mat met = cv::Mat::zeros(walls.size(), CV_8U);
+  const auto sweep = [&](int num_lines, int length, const auto& cell) {
+    for (int line = 0; line < num_lines; ++line) {
+      for (const bool backwards : {false, true}) {
+        bool is_met = false;
+        for (int k = 0; k < length; ++k) {
+          const cv::Point at = cell(line, backwards ? length - 1 - k : k);
+          is_met = is_met || walls.at<uint8_t>(at) != 0;
+          met.at<uint8_t>(at) = static_cast<uint8_t>(met.at<uint8_t>(at) + (is_met ? 1 : 0));
+        }
+      }
+    }
+  };
+  sweep(walls.rows, walls.cols, [](int line, int k) { return cv::Point(k, line); });
+  sweep(walls.cols, walls.rows, [](int line, int k) { return cv::Point(line, k); });
+  return met >= 3;
+}
+
+void add_floor(const RoomModel& model, RoomPlan& plan) {
+  const cv::Mat cells = model.free_cells | between_walls(model, plan);
   std::vector<std::vector<cv::Point>> outlines;
-  cv::findContours(model.free_cells.clone(), outlines, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_SIMPLE);
+  cv::findContours(cells.clone(), outlines, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_SIMPLE);
   double most = 0;
   for (const auto& outline : outlines) most = std::max(most, cv::contourArea(outline));
-  cv::Mat kept = cv::Mat::zeros(model.free_cells.size(), CV_8U);
+  cv::Mat kept = cv::Mat::zeros(cells.size(), CV_8U);
   for (const auto& outline : outlines) {
     if (cv::contourArea(outline) < kLeastPart * most) continue;
     cv::drawContours(kept, std::vector<std::vector<cv::Point>>{outline}, 0, 255, cv::FILLED);
     std::vector<cv::Point2d> points;
     for (const cv::Point& p : outline)
       points.push_back(model.free_origin + model.free_cell * cv::Point2d(p.x + 0.5, p.y + 0.5));
-    plan.free.push_back(std::move(points));
+    plan.floor.push_back(std::move(points));
   }
   plan.area = cv::countNonZero(kept) * model.free_cell * model.free_cell;
+}
+
+// Rows of cells that hold upright surface.
+void add_upright(const RoomModel& model, RoomPlan& plan) {
+  const double cell = 1.5 * model.voxel;
+  std::set<std::pair<int, int>> cells;  // row and column: in the order of rows
+  for (const tv_room_vertex& v : model.vertices) {
+    if (std::abs(dot(normal_of(v), model.up)) > kUprightNormal) continue;
+    const cv::Point2d at = from_above(model.axes, position_of(v)) / cell;
+    cells.emplace(static_cast<int>(std::floor(at.y)), static_cast<int>(std::floor(at.x)));
+  }
+  for (auto first = cells.begin(); first != cells.end();) {
+    auto next = std::next(first);
+    int length = 1;
+    while (next != cells.end() && next->first == first->first &&
+           next->second == first->second + length) {
+      ++length;
+      ++next;
+    }
+    plan.upright.emplace_back(cell * first->second, cell * first->first, cell * length, cell);
+    first = next;
+  }
 }
 
 // The number of the form 1, 2 or 5 times a power of ten that is nearest below.
@@ -106,9 +154,9 @@ double round_below(double value) {
 
 // A drawing on a sheet in pixels, of which both formats are made.
 struct Shape {
-  enum Kind { kArea, kLine, kDot, kText } kind;
+  enum Kind { kArea, kLine, kBox, kText } kind;
   std::vector<cv::Point2d> points;
-  double size = 1;     // width of a line, side of a dot, height of capitals; pixels
+  double size = 1;     // width of a line, height of capitals; pixels
   const char* colour;  // "#rrggbb"
   std::string text;
 };
@@ -118,7 +166,7 @@ struct Drawing {
 };
 
 const char* const kPaper = "#ffffff";
-const char* const kFree = "#e8eef4";
+const char* const kFloor = "#e8eef4";
 const char* const kUpright = "#a9b4bf";
 const char* const kPath = "#3f86d6";
 const char* const kWall = "#1b222b";
@@ -139,10 +187,11 @@ Drawing drawing_of(const RoomPlan& plan, const RoomScene& scene, const RoomModel
     high[0] = std::max(high[0], p.x);
     high[1] = std::max(high[1], p.y);
   };
-  for (const auto& outline : plan.free) std::for_each(outline.begin(), outline.end(), include);
+  for (const auto& outline : plan.floor) std::for_each(outline.begin(), outline.end(), include);
   for (const PlanLine& line : plan.lines) include(line.a), include(line.b);
   std::for_each(plan.path.begin(), plan.path.end(), include);
-  if (!(high[0] > low[0])) std::for_each(plan.upright.begin(), plan.upright.end(), include);
+  if (!(high[0] > low[0]))
+    for (const cv::Rect2d& cells : plan.upright) include(cells.tl()), include(cells.br());
   Drawing sheet;
   if (!(high[0] > low[0]) || !(high[1] > low[1])) return {320, 120, {}};
   const double scale = kSide / std::max(high[0] - low[0], high[1] - low[1]);
@@ -157,11 +206,16 @@ Drawing drawing_of(const RoomPlan& plan, const RoomScene& scene, const RoomModel
     for (const cv::Point2d& p : points) placed.push_back(at(p));
     return placed;
   };
-  for (const auto& outline : plan.free)
-    sheet.shapes.push_back({Shape::kArea, all_at(outline), 1, kFree, ""});
-  for (const cv::Point2d& p : plan.upright)
-    if (p.x >= low[0] && p.y >= low[1] && p.x <= high[0] && p.y <= high[1])
-      sheet.shapes.push_back({Shape::kDot, {at(p)}, scale * plan.cell, kUpright, ""});
+  for (const auto& outline : plan.floor)
+    sheet.shapes.push_back({Shape::kArea, all_at(outline), 1, kFloor, ""});
+  for (const cv::Rect2d& cells : plan.upright)
+    if (cells.x >= low[0] && cells.y >= low[1] && cells.br().x <= high[0] &&
+        cells.br().y <= high[1])
+      sheet.shapes.push_back({Shape::kBox,
+                              {at({cells.x, cells.br().y}), at({cells.br().x, cells.y})},
+                              1,
+                              kUpright,
+                              ""});
   sheet.shapes.push_back({Shape::kLine, all_at(plan.path), 1.2, kPath, ""});
   for (const PlanLine& line : plan.lines)
     sheet.shapes.push_back({Shape::kLine,
@@ -249,17 +303,9 @@ cv::Mat FreeArea::cells() const {
 
 RoomPlan plan_of(const RoomScene& scene, const RoomModel& model) {
   RoomPlan plan;
-  plan.cell = 1.5 * model.voxel;
-  add_free_area(model, plan);
   add_lines(model, plan);
-  std::set<std::pair<int, int>> cells;
-  for (const tv_room_vertex& v : model.vertices) {
-    if (std::abs(dot(normal_of(v), model.up)) > kUprightNormal) continue;
-    const cv::Point2d at = from_above(model.axes, position_of(v)) / plan.cell;
-    cells.emplace(static_cast<int>(std::floor(at.x)), static_cast<int>(std::floor(at.y)));
-  }
-  for (const auto& [x, y] : cells)
-    plan.upright.push_back(plan.cell * cv::Point2d(x + 0.5, y + 0.5));
+  add_floor(model, plan);
+  add_upright(model, plan);
   for (const RoomView& view : scene.views) plan.path.push_back(from_above(model.axes, view.t));
   return plan;
 }
@@ -283,12 +329,13 @@ std::string plan_svg(const RoomPlan& plan, const RoomScene& scene, const RoomMod
         svg += "<polyline fill=\"none\" stroke=\"" + colour + "\" stroke-width=\"" + size +
                "\" points=\"" + points + "\"/>\n";
         break;
-      case Shape::kDot: {
-        const cv::Point2d half(shape.size / 2, shape.size / 2);
-        const std::string corner = point_text(shape.points[0] - half);
-        const size_t comma = corner.find(',');
+      case Shape::kBox: {
+        const cv::Point2d sides = shape.points[1] - shape.points[0];
+        const std::string corner = point_text(shape.points[0]), box = point_text(sides);
+        const size_t comma = corner.find(','), middle = box.find(',');
         svg += "<rect x=\"" + corner.substr(0, comma) + "\" y=\"" + corner.substr(comma + 1) +
-               "\" width=\"" + size + "\" height=\"" + size + "\" fill=\"" + colour + "\"/>\n";
+               "\" width=\"" + box.substr(0, middle) + "\" height=\"" + box.substr(middle + 1) +
+               "\" fill=\"" + colour + "\"/>\n";
         break;
       }
       case Shape::kText: {
@@ -319,11 +366,9 @@ cv::Mat plan_picture(const RoomPlan& plan, const RoomScene& scene, const RoomMod
           put_line(sheet, shape.points[k - 1], shape.points[k], colour,
                    std::max(1, static_cast<int>(std::lround(shape.size))));
         break;
-      case Shape::kDot: {
-        const cv::Point2d half(shape.size / 2, shape.size / 2);
-        cv::rectangle(sheet, shape.points[0] - half, shape.points[0] + half, colour, cv::FILLED);
+      case Shape::kBox:
+        cv::rectangle(sheet, shape.points[0], shape.points[1], colour, cv::FILLED);
         break;
-      }
       case Shape::kText: put_text(sheet, shape.text, shape.points[0], shape.size, colour); break;
     }
   }

@@ -1,4 +1,6 @@
-// The room from above: walls as lines, the free floor with its area, a scale bar.
+// The room from above: walls as lines, the floor with its area, a scale bar. The floor is what was
+// looked across, and what lies between walls: a cell from which in three of the four directions
+// along the room's axes a wall is met.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -39,12 +41,11 @@ struct PlanLine {
 };
 
 struct RoomPlan {
-  std::vector<PlanLine> lines;                 // of upright planes
-  std::vector<std::vector<cv::Point2d>> free;  // outlines of the free area
-  std::vector<cv::Point2d> upright;            // of surfaces that stand upright
-  std::vector<cv::Point2d> path;               // of the camera
-  double area = 0;                             // of the free area, squares of the unit
-  double cell = 1;                             // side of what a point of `upright` stands for
+  std::vector<PlanLine> lines;                  // of upright planes
+  std::vector<std::vector<cv::Point2d>> floor;  // its outlines
+  std::vector<cv::Rect2d> upright;              // covers surfaces that stand upright
+  std::vector<cv::Point2d> path;                // of the camera
+  double area = 0;                              // of the floor, squares of the unit
 };
 RoomPlan plan_of(const RoomScene& scene, const RoomModel& model);
 

@@ -111,7 +111,7 @@ std::string room_glb(const RoomModel& model) {
       append_float(normals, static_cast<float>(normal[k]));
     }
     for (const uint8_t value : v.rgb) append_bits(colours, linear_16(value), 2);
-    append_bits(colours, 65535, 2);  // alpha, which Assimp 5 takes as 0 where it is not given
+    append_bits(colours, 65535, 2);  // alpha: assimp-py 1.2.0 (2026) takes 0 without it
     append_float(sigmas, v.sigma);
   }
   for (const tv_room_triangle& t : model.triangles)

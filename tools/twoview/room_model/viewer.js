@@ -50,7 +50,7 @@
 
   // The eye: yaw about the vertical, pitch below the horizon, radians. Around the room it looks at
   // `target` from `distance`; a walker stands at `eye`.
-  const start = { yaw: 0.9, pitch: 0.75, distance: 2.1 * radius, target: middle.slice() };
+  const start = { yaw: 0.9, pitch: 0.75, distance: 2.5 * radius, target: middle.slice() };
   const view = Object.assign({ walks: false, eye: middle.slice(), shape: false, path: true }, start);
   let marks = [], pending = 0, buffers = null;
 
@@ -108,15 +108,10 @@
       const x1 = Math.min(width - 1, Math.floor(ax + Math.max(0, bx, cx) + 0.5));
       const y0 = Math.max(0, Math.ceil(ay + Math.min(0, by, cy) - 0.5));
       const y1 = Math.min(height - 1, Math.floor(ay + Math.max(0, by, cy) + 0.5));
-      let red, green, blue;
-      if (shade) {
-        red = green = blue = (shade[a] + shade[b] + shade[c]) / 3;
-      } else {
-        red = (photo[3 * a] + photo[3 * b] + photo[3 * c]) / 3;
-        green = (photo[3 * a + 1] + photo[3 * b + 1] + photo[3 * c + 1]) / 3;
-        blue = (photo[3 * a + 2] + photo[3 * b + 2] + photo[3 * c + 2]) / 3;
-      }
-      const colour = (0xff000000 | blue << 16 | green << 8 | red) >>> 0;
+      const source = shade || photo, i = shade ? 1 : 3, g = shade ? 0 : 1, u = shade ? 0 : 2;
+      const ra = source[i * a], ga = source[i * a + g], ba = source[i * a + u];
+      const rb = source[i * b] - ra, gb = source[i * b + g] - ga, bb = source[i * b + u] - ba;
+      const rc = source[i * c] - ra, gc = source[i * c + g] - ga, bc = source[i * c + u] - ba;
       for (let y = y0; y <= y1; ++y) {
         const dy = y - ay;
         for (let x = x0; x <= x1; ++x) {
@@ -128,7 +123,8 @@
           if (z <= near[at]) continue;
           near[at] = z;
           hit[at] = t;
-          pixels[at] = colour;
+          pixels[at] = 0xff000000 | (ba + wb * bb + wc * bc) << 16 |
+            (ga + wb * gb + wc * gc) << 8 | (ra + wb * rb + wc * rc);
         }
       }
     }
