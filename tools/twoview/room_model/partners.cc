@@ -30,8 +30,10 @@ double cosine_between(const Matrix3& a, const Matrix3& b) {
   return std::clamp((trace - 1) / 2, -1.0, 1.0);
 }
 
-// What is new enough for a depth map of its own; the cosine is that of 10 degrees.
-constexpr double kNewStep = 1.0 / 12, kNewCosine = 0.984807753012208;
+// What is new enough for a depth map of its own; the cosine is that of 12 degrees. Of the 88
+// keyframes of a rendered flight 48 are left: F at 5 cm 0.695 in place of 0.701 with the 68 of a
+// twelfth and 10 degrees, in 0.74 of the time.
+constexpr double kNewStep = 1.0 / 8, kNewCosine = 0.9781476007338057;
 
 struct Candidate {
   size_t view;

@@ -16,8 +16,8 @@ struct DepthRange {
 // By the scene's points that the view shows; not known with fewer than twenty of them.
 DepthRange depth_range(const RoomScene& scene, const RoomView& view);
 
-// The keyframes that get a depth map: those that see something new by a step of a twelfth of the
-// median depth or a turn of 10 degrees from the one chosen before. median_depth 0: all.
+// The keyframes that get a depth map: those that see something new by a step of an eighth of the
+// median depth or a turn of 12 degrees from the one chosen before. median_depth 0: all.
 std::vector<size_t> choose_keyframes(const RoomScene& scene, double median_depth);
 
 // The indices of up to four views of the scene that show what view `key` shows, from places a tenth
