@@ -424,7 +424,7 @@ void test_what_does_not_fit_together_is_refused_in_a_line() {
   check_refused("--recording " + folder + camera + " --frames 3 4000", "no frame 4000");
   check_refused("--recording " + folder + camera + " --frames 3", "--frames");
   check_refused("--recording " + folder + camera + " --body-from-camera 1,0,0,0,1,0,0,0,-1",
-                "not a rotation");
+                "no rotation");
   check_refused("--recording " + folder + " --camera " +
                     write_camera(flight, "body_from_camera: [1, 2, 3]\n"),
                 "3 numbers, not 9");

@@ -92,8 +92,9 @@ std::vector<FrameLine> read_frame_lines(const fs::path& path) {
       refuse("is no frame: host time, device time, number, key");
     }
     if (!lines.empty() && host <= lines.back().time_ns) {
-      refuse("has a host time that is not later than that of the line before: the clock of the "
-             "recording computer was set back");
+      refuse(
+          "has a host time that is not later than that of the line before: the clock of the "
+          "recording computer was set back");
     }
     lines.push_back({host, picture});
   }
