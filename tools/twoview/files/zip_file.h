@@ -23,7 +23,4 @@ std::vector<ZipMember> zip_members(std::string_view archive, const std::string& 
 // The member's content. Throws BadInput where it is damaged.
 std::string content_of(const ZipMember& member, const std::string& name);
 
-// Inflates a raw deflate stream (RFC 1951) of exactly `size` bytes; false where it is damaged.
-bool inflate(std::string_view stream, size_t size, std::string& content);
-
 }  // namespace cli
