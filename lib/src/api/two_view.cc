@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstring>
+#include <new>
 #include <utility>
 
 #include "api/sized.h"
@@ -274,10 +275,17 @@ void estimate(tv_context* context, TwoViewProblem& problem, Matches* matches, Tw
   finish_two_view(problem, *model, context->arena, matches, outcome);
 }
 
-// The same without the matches that stand still. True: they are no part of the scene, and `problem`
-// has them left out; else it is as before, and there are no results.
-bool estimate_without_still(tv_context* context, TwoViewProblem& problem, Matches* matches,
-                            TwoViewModel* model, TwoViewOutcome* outcome, int* num_still) {
+void take_cameras(const tv_camera* const cameras[2], TwoViewProblem& problem) {
+  problem.camera[0] = prepare_camera(*cameras[0]);
+  problem.camera[1] = prepare_camera(*cameras[1]);
+}
+
+// The same without the matches that stand still. cameras: those of the problem. True: the matches
+// are no part of the scene, and `problem` has them left out; else it is as before, and there are no
+// results.
+bool estimate_without_still(tv_context* context, const tv_camera* const cameras[2],
+                            TwoViewProblem& problem, Matches* matches, TwoViewModel* model,
+                            TwoViewOutcome* outcome, int* num_still) {
   const tv_camera &first = problem.camera[0].model, &second = problem.camera[1].model;
   if (!problem.calibrated || first.width != second.width || first.height != second.height) {
     return false;
@@ -285,18 +293,19 @@ bool estimate_without_still(tv_context* context, TwoViewProblem& problem, Matche
   uint8_t* is_still = arena_alloc<uint8_t>(context->arena, static_cast<size_t>(problem.num));
   *num_still = find_still_matches(problem, is_still);
   if (*num_still == 0) return false;
-  TwoViewProblem without = problem;
-  without.is_still = is_still;
   const size_t used_bytes = context->arena.used_bytes;
-  estimate(context, without, matches, model, outcome);
-  if (contradicts_still(without, *matches, *outcome, *num_still)) {
-    problem = without;
-    return true;
-  }
+  problem.is_still = is_still;
+  estimate(context, problem, matches, model, outcome);
+  if (contradicts_still(problem, *matches, *outcome, *num_still)) return true;
+  problem.is_still = nullptr;
+  take_cameras(cameras, problem);
+  problem.focal_log_scale = 0;
+  problem.focal_is_ambiguous = false;
   context->arena.used_bytes = used_bytes;
-  *matches = Matches{};
-  *model = TwoViewModel{};
-  *outcome = TwoViewOutcome{};
+  // In place, since each temporary would lie on the stack, too.
+  new (matches) Matches{};
+  new (model) TwoViewModel{};
+  new (outcome) TwoViewOutcome{};
   *num_still = 0;
   return false;
 }
@@ -389,6 +398,7 @@ tv_status tv_estimate_two_view(tv_context* context, const tv_camera* camera0,
   tv::ArenaScope scope(context->arena);
   tv::Matches matches{};
   tv::TwoViewModel model{};
+  const tv_camera* cameras[2] = {camera0, camera1};
   bool swapped;
   {
     tv::StageTimer timer(context, TV_STAGE_ESTIMATE);
@@ -408,9 +418,9 @@ tv_status tv_estimate_two_view(tv_context* context, const tv_camera* camera0,
       o.center_sigma0 = o.center_sigma1 =
           o.center_sigma0 > o.center_sigma1 ? o.center_sigma0 : o.center_sigma1;
     }
+    if (swapped) std::swap(cameras[0], cameras[1]);
     if (calibrated) {
-      problem.camera[0] = tv::prepare_camera(swapped ? *camera1 : *camera0);
-      problem.camera[1] = tv::prepare_camera(swapped ? *camera0 : *camera1);
+      tv::take_cameras(cameras, problem);
     }
     if (swapped) {
       std::swap(problem.pixels[0], problem.pixels[1]);
@@ -423,7 +433,8 @@ tv_status tv_estimate_two_view(tv_context* context, const tv_camera* camera0,
   }
   tv::TwoViewOutcome outcome{};
   int num_still = 0;
-  if (!tv::estimate_without_still(context, problem, &matches, &model, &outcome, &num_still)) {
+  if (!tv::estimate_without_still(context, cameras, problem, &matches, &model, &outcome,
+                                  &num_still)) {
     tv::estimate(context, problem, &matches, &model, &outcome);
   }
   tv::pack(problem, matches, model, outcome, swapped, num_still, result);

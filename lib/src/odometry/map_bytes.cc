@@ -180,8 +180,7 @@ bool is_header(const Header& h) {
   return are_counts(&h.num_points, &h.num_loops) && is_index(h.is_upright, 2) &&
          is_index(h.scale_source, 4) && is_index(h.evidence, 4) &&
          is_measure(h.product, h.square) && (h.square > 0 || h.product == 0) &&
-         (h.square > 0) == (h.evidence != TV_SCALE_UNIT) &&
-         is_measure(0, h.scale_sigma) &&
+         (h.square > 0) == (h.evidence != TV_SCALE_UNIT) && is_measure(0, h.scale_sigma) &&
          std::fabs(h.principal_point[0] - h.camera.cx) < h.camera.fx &&
          std::fabs(h.principal_point[1] - h.camera.cy) < h.camera.fx &&
          tv_camera_check(&h.camera) == TV_OK;
