@@ -1247,12 +1247,14 @@ static void test_a_map_of_wrong_content_is_refused(void) {
   put(36, 1, 4), expect_sealed(TV_ERR_MAP, num_map);   /* the camera's reserved field */
   put(40, nan, 8), expect_sealed(TV_ERR_MAP, num_map); /* fx */
   put(172, 2, 4), expect_sealed(TV_ERR_MAP, num_map);  /* upright or not */
+  put(172, 1, 4), expect_sealed(TV_ERR_MAP, num_map);  /* where no keyframe knows what is down */
   for (k = 136; k < 172; k += 4) {                     /* the counts */
     put(k, 0xffffffffu, 4), expect_sealed(TV_ERR_MAP, num_map);
   }
   put(176, 4, 4), expect_sealed(TV_ERR_MAP, num_map); /* the scale */
   put(184, 0x3ff0000000000000u, 8), put(192, 0, 8), expect_sealed(TV_ERR_MAP, num_map);
   put(192, nan, 8), expect_sealed(TV_ERR_MAP, num_map);
+  put(180, 1, 4), put(184, huge, 8), put(192, 1, 8), expect_sealed(TV_ERR_MAP, num_map);
   put(208, nan, 8), expect_sealed(TV_ERR_MAP, num_map); /* the principal point */
   put(216, huge, 8), expect_sealed(TV_ERR_MAP, num_map);
   for (k = 136; k < 148; k += 4) { /* one more or one less than there are */
@@ -1283,6 +1285,8 @@ static void test_a_map_of_wrong_content_is_refused(void) {
   put(keyframe + 24, 0x3fe0000000000000u, 8), expect_sealed(TV_ERR_MAP, num_map);
   put(keyframe + 96, nan, 8), expect_sealed(TV_ERR_MAP, num_map);
   put(keyframe + 144, 0xbff0000000000000u, 8), expect_sealed(TV_ERR_MAP, num_map);
+  /* Who knows what is down, in a map that is not upright. */
+  put(keyframe + 144, 0x3ff0000000000000u, 8), expect_sealed(TV_ERR_MAP, num_map);
   put(keyframe + 168, 0, 8), expect_sealed(TV_ERR_MAP, num_map);
   /* Keypoints: x, size, a point that does not exist. */
   put(keypoint, 0x7fc00000u, 4), expect_sealed(TV_ERR_MAP, num_map);

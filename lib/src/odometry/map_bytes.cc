@@ -179,8 +179,10 @@ bool is_pose(const Rigid& pose) { return is_rotation(pose.R) && are_lengths(pose
 bool is_header(const Header& h) {
   return are_counts(&h.num_points, &h.num_loops) && is_index(h.is_upright, 2) &&
          is_index(h.scale_source, 4) && is_index(h.evidence, 4) &&
-         is_measure(h.product, h.square) && (h.square > 0 || h.product == 0) &&
-         (h.square > 0) == (h.evidence != TV_SCALE_UNIT) && is_measure(0, h.scale_sigma) &&
+         is_measure(h.product, h.square) && is_measure(0, h.scale_sigma) &&
+         (h.evidence == TV_SCALE_UNIT
+              ? h.square == 0 && h.product == 0
+              : h.square > 0 && is_finite(h.product / h.square * h.product)) &&
          std::fabs(h.principal_point[0] - h.camera.cx) < h.camera.fx &&
          std::fabs(h.principal_point[1] - h.camera.cy) < h.camera.fx &&
          tv_camera_check(&h.camera) == TV_OK;
@@ -218,6 +220,19 @@ __attribute__((noinline)) tv_camera camera_of(const Odometry& odometry) {
   return camera;
 }
 
+// Whether a keyframe of the segment has a direction of gravity: is_upright(map, segment) of the
+// keyframes that follow in the stream.
+bool is_upright_in(Stream s, const Header& h, int32_t segment) {
+  bool found = false;
+  for (int32_t n = 0; n < h.num_keyframes && !found; ++n) {
+    MapKeyframe keyframe{};
+    pass(&s, &keyframe, kOfKeyframe);
+    found = keyframe.segment == segment && keyframe.down_sigma_rad > 0;
+    s.at += static_cast<size_t>(keyframe.num_keypoints) * (sizeof(MapKeypoint) + sizeof(int32_t));
+  }
+  return found;
+}
+
 // What the numbers of a map that is added to another one begin with.
 struct Base {
   int32_t point_id, keyframe_id, segment, frame;
@@ -249,11 +264,14 @@ bool read_body(const Header& h, Stream* s, int32_t* places, Map* map, const Base
     map->points[places[n]] = point;
   }
   last_id = -1;
+  const Stream keyframes = *s;
+  int32_t newest_segment = -1;
   for (int32_t n = 0; n < h.num_keyframes; ++n) {
     MapKeyframe keyframe{};
     pass(s, &keyframe, kOfKeyframe);
     if (s->is_bad || !is_keyframe(h, keyframe) || keyframe.id <= last_id) return false;
     last_id = keyframe.id;
+    newest_segment = keyframe.segment;
     *fits = *fits && keyframe.num_keypoints <= sizes.max_keypoints;
     MapKeypoint* own = nullptr;
     int32_t* seen = nullptr;
@@ -278,6 +296,7 @@ bool read_body(const Header& h, Stream* s, int32_t* places, Map* map, const Base
       if (point != kNoPoint) observe(map, map->num_keyframes - 1, k, places[point]);
     }
   }
+  if (!stores && is_upright_in(keyframes, h, newest_segment) != (h.is_upright != 0)) return false;
   last_id = -1;
   const int32_t surplus = map->num_removed + h.num_removed - max_removed(sizes);
   if (stores && surplus > 0) forget_removed(map, surplus);
