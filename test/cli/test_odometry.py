@@ -532,6 +532,17 @@ class OdometryTest(CliTest):
         self.assertEqual((result["scale"], result["scale_contradiction"]), ("metric", None))
         self.assertAlmostEqual(result["truth"]["scale_ratio"], 1, delta=0.02)
 
+    def test_a_file_most_of_which_no_drone_has_gives_no_metre(self):
+        # In millimetres the height is still one that a drone may have.
+        source = self.set_folder()
+        for height, speed in ((1.5, 1e3), (1.5e3, 1e3), (1.5e5, 1)):
+            self.imu(lines=[f"{t:.9f} 1 0 0 0 0.01 {height + height / 15 * math.sin(2 * t):.6f} "
+                            f"0.015 0 {speed * 0.1 * FPS} 0 0.02" for t in TIMES])
+            done = self.succeed(self.odometry(source))
+            self.assertIn("most are not in metres, so no height and no velocity is used",
+                          (done.stdout + done.stderr).decode())
+            self.assertEqual(self.result()["scale"], "unit")
+
     def test_a_lying_attitude_is_reported_and_left_out(self):
         source = self.set_folder()
         lines = [f"{t:.9f} 1 0 0 0 0.01 1.5 0.015 0 {0.1 * FPS} 0 0.02" for t in TIMES]

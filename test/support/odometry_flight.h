@@ -20,8 +20,10 @@ inline tv_odometry* begin_room_flight(uint8_t* memory, size_t bytes) {
   return odometry;
 }
 
-// Tracks frame n of the flight, or a grey one in its place.
-inline tv_odometry_state track_room(tv_odometry* odometry, int n, bool is_blank = false) {
+// Tracks frame n of the flight, or a grey one in its place; a velocity of 0 with a standard
+// deviation, or none.
+inline tv_odometry_state track_room(tv_odometry* odometry, int n, bool is_blank = false,
+                                    double velocity_sigma_m_s = 0) {
   static uint8_t pixels[ROOM_WIDTH * ROOM_HEIGHT];
   room_flight(n, pixels);
   if (is_blank) std::memset(pixels, 99, sizeof pixels);
@@ -29,6 +31,7 @@ inline tv_odometry_state track_room(tv_odometry* odometry, int n, bool is_blank 
   tv_odometry_frame_init(&frame);
   frame.image = {pixels, ROOM_WIDTH, ROOM_HEIGHT, ROOM_WIDTH};
   frame.time_s = n / 30.0;
+  frame.velocity_sigma_m_s = velocity_sigma_m_s;
   tv_odometry_state state;
   tv_odometry_state_init(&state);
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_track(odometry, &frame, &state));

@@ -43,7 +43,7 @@ double path_length() {
 double scale_of_ways() {
   const tv::MetricScale kept = odometry->scale;
   odometry->scale = tv::MetricScale{};
-  tv::add_ways(odometry, 1);
+  tv::gather_ways(odometry);
   const double scale = odometry->scale.velocity.product / odometry->scale.velocity.square;
   odometry->scale = kept;
   return scale;
@@ -59,9 +59,40 @@ void measure_ways(double metres) {
         tv::motion_between(map.keyframes[k - 1].cam_from_world, map.keyframes[k].cam_from_world);
     for (int c = 0; c < 3; ++c) map.keyframes[k].way_m[c] = -metres * back.t[c];
     map.keyframes[k].way_variance = 0.01;
+    map.keyframes[k].is_followed = true;
   }
   odometry->scale = tv::MetricScale{};
-  tv::add_ways(odometry, 1);
+  tv::gather_ways(odometry);
+}
+
+// Whoever is found again after a loss is not where the ways led.
+void test_a_way_across_a_loss_says_nothing_of_the_scale() {
+  add_keyframes();
+  measure_ways(0.8);
+  tv::MapKeyframe& found = odometry->map.keyframes[kNum / 2];
+  found.cam_from_world.t[0] -= 7;
+  found.way_m[0] += 3;
+  found.is_followed = (&found)[1].is_followed = false;
+  tv::gather_ways(odometry);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.8, known_scale());
+  TEST_ASSERT_TRUE(odometry->scale.velocity.num == 3 * (kNum - 3));
+}
+
+// Ways that contradict the map are outliers, but not where they are most of them.
+void test_contrary_ways_count_where_they_say_more_than_the_others() {
+  add_keyframes();
+  for (const int num_contrary : {kNum / 2 - 1, kNum / 2 + 1}) {
+    measure_ways(0.8);
+    for (int k = 1; k <= num_contrary; ++k) {
+      odometry->map.keyframes[k].is_contrary = true;
+      odometry->map.keyframes[k].way_m[0] *= -1;
+    }
+    tv::gather_ways(odometry);
+    const tv::ScaleEstimate estimate = tv::velocity_estimate(odometry->scale);
+    const double of_all = 0.8 * (kNum - 1 - 2 * num_contrary) / (kNum - 1);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, num_contrary < kNum / 2 ? 0.8 : of_all,
+                              estimate.product / estimate.square);
+  }
 }
 
 void test_the_metre_keeps_its_length_when_a_loop_stretches_the_path() {
@@ -83,6 +114,7 @@ void test_the_metre_goes_with_a_segment_that_joins_another_one() {
   add_keyframes();
   measure_ways(0.8);
   for (int k = 0; k < 5; ++k) odometry->map.keyframes[k].segment = 1;
+  for (int k = 0; k <= 5; ++k) odometry->map.keyframes[k].is_followed = false;
   const tv::LoopEnd end = {2, tv::kIdentity, 2};
   const tv::Frame nothing{};
   tv::close_loop(odometry, kNum - 1, nothing, end);
@@ -278,7 +310,7 @@ void test_the_metre_is_that_of_the_ways_as_they_are() {
     for (int c = 0; c < 3; ++c) odometry->map.keyframes[k].way_m[c] = -0.5 * back.t[c];
   }
   odometry->scale = tv::MetricScale{};
-  tv::add_ways(odometry, 1);
+  tv::gather_ways(odometry);
   int steps = 0;
   while (tv::adjust_segment(odometry, 0, 0, 1)) ++steps;
   TEST_ASSERT_TRUE(steps > 1);
@@ -534,6 +566,8 @@ extern "C" void tearDown(void) {}
 int main() {
   UNITY_BEGIN();
   RUN_TEST(test_drift_explains_a_loop_only_within_bounds);
+  RUN_TEST(test_a_way_across_a_loss_says_nothing_of_the_scale);
+  RUN_TEST(test_contrary_ways_count_where_they_say_more_than_the_others);
   RUN_TEST(test_the_metre_keeps_its_length_when_a_loop_stretches_the_path);
   RUN_TEST(test_the_metre_goes_with_a_segment_that_joins_another_one);
   RUN_TEST(test_a_large_correction_is_a_jump);

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "odometry/odometry.h"
+#include "odometry/metric.h"
 #include "support/odometry_flight.h"
 
 namespace {
@@ -51,6 +51,41 @@ void test_frames_are_in_doubt_after_keyframes_that_nothing_confirmed() {
     TEST_ASSERT_EQUAL_UINT32(num_unconfirmed < 3 ? 0 : TV_REASON_LOW_PARALLAX, state.reasons);
     TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_TRACKING, track_room(odometry, ++n).status);  // confirmed now
   }
+}
+
+// The metres in a unit of the map, by the velocities.
+double known_scale() {
+  const tv::ScaleEstimate estimate = tv::velocity_estimate(odometry->scale);
+  return estimate.product / estimate.square;
+}
+
+// Velocities that are believed contradict the map since the last confirmed keyframe, where its ways
+// are a fifth of theirs.
+void test_a_map_that_is_removed_says_nothing_of_the_scale() {
+  constexpr int kWrong = 3;
+  int n = 0;
+  while (!track_room(odometry, n).is_keyframe || n < 60) ++n;
+  track_room(odometry, ++n);  // the keyframe is adjusted
+  tv::Map& map = odometry->map;
+  const int32_t num = map.num_keyframes;
+  TEST_ASSERT_TRUE(num > 2 * kWrong);
+  for (int32_t k = 1; k < num; ++k) {
+    tv::MapKeyframe& own = map.keyframes[k];
+    const tv::Rigid back = tv::motion_between((&own)[-1].cam_from_world, own.cam_from_world);
+    for (int c = 0; c < 3; ++c) own.way_m[c] = (k < num - kWrong ? -2 : -10) * back.t[c];
+    own.way_variance = 1e-4;
+    own.is_followed = true;
+  }
+  tv::gather_ways(odometry);
+  TEST_ASSERT_TRUE(known_scale() > 2.1);
+  odometry->confirmed_id = map.keyframes[num - kWrong - 1].id;
+  odometry->scale.source = TV_SCALE_VELOCITY;
+  odometry->velocity_trust = odometry->num_contrary = 100;
+  odometry->travel.is_known = true;
+  odometry->travel.way_m[0] = 10;
+  TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_LOST, track_room(odometry, ++n, false, 0.01).status);
+  TEST_ASSERT_EQUAL_INT(num - kWrong, map.num_keyframes);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 2, known_scale());
 }
 
 // A keyframe that is put off its place goes back in its adjustment, before the next frame or when
@@ -113,6 +148,7 @@ int main() {
   UNITY_BEGIN();
   RUN_TEST(test_the_frame_that_ends_a_doubt_is_in_doubt);
   RUN_TEST(test_frames_are_in_doubt_after_keyframes_that_nothing_confirmed);
+  RUN_TEST(test_a_map_that_is_removed_says_nothing_of_the_scale);
   RUN_TEST(test_the_frame_after_a_large_adjustment_is_weak);
   RUN_TEST(test_frames_are_weak_while_the_keyframes_turns_are_unsure_together);
   return UNITY_END();

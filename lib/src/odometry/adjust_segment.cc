@@ -167,10 +167,8 @@ bool adjust_segment(Odometry* odometry, int32_t segment, int32_t first_id, int32
   for (int32_t v = 0; v < num_free; ++v) {
     moved[window.keyframes[v]] = {pose_of(window, v), 1};
   }
-  const bool counts = segment == odometry->segment;
-  if (counts) add_ways(odometry, -1);
   move_keyframes(&map, moved);
-  if (counts) add_ways(odometry, 1);
+  if (segment == odometry->segment) gather_ways(odometry);
   keep_positions(window, &map);
   return window.result.final_cost < (1 - kLeastGain) * window.result.initial_cost;
 }

@@ -283,21 +283,18 @@ bool close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const 
     const double share = segment == old_segment ? 1 - paths[k] / whole : 1;
     moved[k] = blend(own.cam_from_world, from_end, end.scale, share);
   }
-  if (segment == old_segment) add_ways(odometry, -1);
   move_keyframes(&map, moved);
   for (int32_t k = 0; k <= newest; ++k) {
     if (moved[k].scale != 0) map.keyframes[k].segment = old_segment;
   }
   if (odometry->doubtful_segment == segment) odometry->doubtful_segment = old_segment;
-  if (segment == old_segment) add_ways(odometry, 1);
   for (int32_t p = 0; p < map.end_points; ++p) {
     if (map.points[p].segment == segment) map.points[p].segment = old_segment;
   }
   const MetricScale own = odometry->scale;
   enter_segment(odometry, old_segment);
-  if (segment != old_segment) {
-    join_scale(own, end.scale, odometry);
-  }
+  if (segment != old_segment) join_scale(own, end.scale, odometry);
+  gather_ways(odometry);
   fuse_points(odometry, keyframe, again);
   odometry->weak_loop.frame = -1;
   odometry->is_found_again = false;

@@ -37,6 +37,8 @@ void join_ways(const MapKeyframe& removed, MapKeyframe* own) {
   transform(way, removed.way_m, own->way_m);
   const bool is_known = removed.way_variance > 0 && own->way_variance > 0;
   own->way_variance = is_known ? own->way_variance + removed.way_variance : 0;
+  own->is_followed = removed.is_followed && own->is_followed;
+  own->is_contrary = removed.is_contrary || own->is_contrary;
 }
 
 // Frames that were relative to a keyframe that is removed, also those of others before it, are

@@ -33,6 +33,8 @@ struct MapKeyframe {
   // the map. Variance 0: not known. No part of a map's bytes, which hold time_s to scale as they
   // are.
   double way_m[3], way_variance;
+  bool is_followed;  // all frames since the keyframe before were tracked, one from the other
+  bool is_contrary;  // the way of the map, or of a frame since then, contradicted the velocities
 };
 
 struct MapPoint {

@@ -117,7 +117,7 @@ void add_priors(const Odometry& odometry, int32_t view, MapWindow* window) {
         view, 0, {own.down[0], own.down[1], own.down[2]}, own.down_sigma_rad};
   }
   if (odometry.scale.source == TV_SCALE_UNIT || own.segment != odometry.segment || k == 0 ||
-      !(own.way_variance > 0)) {
+      !(own.way_variance > 0) || own.is_contrary) {
     return;
   }
   const double way = length_of(own.way_m), sigma = kNoise * std::sqrt(own.way_variance);

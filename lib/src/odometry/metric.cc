@@ -69,21 +69,29 @@ Ways ways_to(const Travel& travel, const Rigid& cam_from_world) {
   return ways;
 }
 
-// Adds `sign` times `way`, which is that of one way.
-void add_evidence(const ScaleEvidence& way, double sign, ScaleEvidence* evidence) {
-  evidence->product += sign * way.product;
-  evidence->square += sign * way.square;
-  evidence->noise += sign * way.noise;
-  evidence->total += sign * way.total;
-  evidence->num += sign * way.num;
+void add_evidence(const ScaleEvidence& more, ScaleEvidence* evidence) {
+  evidence->product += more.product;
+  evidence->square += more.square;
+  evidence->noise += more.noise;
+  evidence->total += more.total;
+  evidence->num += more.num;
 }
 
-// Adds `sign` times what the way from the keyframe before says of the segment's scale, by least
-// squares of the sensors' way = scale way.
-void add_way(Odometry* odometry, int32_t keyframe, double sign) {
+// The map's unit became 1 / factor of what it was.
+void stretch(double factor, ScaleEvidence* evidence) {
+  evidence->product *= factor;
+  evidence->square *= factor * factor;
+  evidence->noise *= factor * factor;
+}
+
+// Adds what the way from the keyframe before says of the segment's scale, by least squares of the
+// sensors' way = scale way. Where the camera was lost in between, the way is as good as the pose
+// that it was found with, and says nothing.
+void add_way(Odometry* odometry, int32_t keyframe) {
   const MapKeyframe& own = odometry->map.keyframes[keyframe];
   const MapKeyframe& before = odometry->map.keyframes[keyframe - 1];
   if (own.segment != odometry->segment || before.segment != odometry->segment) return;
+  if (!own.is_followed) return;
   // In the camera's axes, the way back.
   const Rigid motion = motion_between(before.cam_from_world, own.cam_from_world);
   const double* back = motion.t;
@@ -92,7 +100,7 @@ void add_way(Odometry* odometry, int32_t keyframe, double sign) {
     const double weight = 1 / own.way_variance;
     add_evidence({-weight * dot(own.way_m, back), weight * square, 3 * weight * noise,
                   weight * length_sq_of(own.way_m), 3},
-                 sign, &odometry->scale.velocity);
+                 own.is_contrary ? &odometry->scale.contrary : &odometry->scale.velocity);
   }
   if (odometry->is_upright && own.height_sigma_m > 0 && before.height_sigma_m > 0) {
     double in_world[3];
@@ -102,14 +110,38 @@ void add_way(Odometry* odometry, int32_t keyframe, double sign) {
                                before.height_sigma_m * before.height_sigma_m);
     add_evidence({weight * climb_m * climb, weight * climb * climb, weight * noise,
                   weight * climb_m * climb_m, 1},
-                 sign, &odometry->scale.height);
+                 &odometry->scale.height);
   }
+}
+
+// The residuals' sum of squares is chi2. Where it is larger than their number, the sensor errs more
+// than it states, and in proportion: heights have the steps of the ground. Where velocities have
+// other directions than the map, as those that come late, the slope of their ways over the map's is
+// too small, but that of the map's over theirs too large: what lies between the two, beyond the
+// stated noise, is uncertain, too. So is by how much the map's own errors make the slope too small;
+// in level flight the map climbs by little else, and heights say nothing.
+ScaleEstimate estimate_of(const ScaleEvidence& evidence, int32_t source) {
+  if (!(evidence.num > 0 && evidence.square > 2 * evidence.noise)) return {};
+  const double slope = evidence.product / evidence.square;
+  const double chi2 = evidence.total - slope * evidence.product;
+  const double num = std::max(evidence.num - 1, 1.0);
+  const double more = std::max(chi2 - num, 0.0);
+  const double between = more > 0 && source == TV_SCALE_VELOCITY ? more / evidence.product : 0;
+  const double bias = slope * evidence.noise / (evidence.square - evidence.noise);
+  const double share = 1 / (1 + more / num + (between * between + bias * bias) * evidence.square);
+  if (!(share > 0)) return {};
+  return {source, share * evidence.product, share * evidence.square};
+}
+
+// The sums without the keyframes' ways.
+void begin_sums(MetricScale* scale) {
+  scale->height = scale->velocity = scale->contrary = ScaleEvidence{};
+  (scale->loaded_source == TV_SCALE_HEIGHT ? scale->height : scale->velocity) = scale->loaded;
 }
 
 // Whether heights and velocities contradict each other by more than their standard deviations.
 bool is_contradicted(const MetricScale& known) {
-  const ScaleEstimate h = estimate_of(known.height, TV_SCALE_HEIGHT);
-  const ScaleEstimate v = estimate_of(known.velocity, TV_SCALE_VELOCITY);
+  const ScaleEstimate h = height_estimate(known), v = velocity_estimate(known);
   if (h.source == TV_SCALE_UNIT || v.source == TV_SCALE_UNIT) return known.is_contradicted;
   const double height = h.product / h.square, velocity = v.product / v.square;
   const double difference = height - velocity;
@@ -141,7 +173,8 @@ void settle_scale(Odometry* odometry, Frame* frame) {
   known->source = now.source;
   if (std::fabs(scale - 1) < kLeastChange) return;
   rescale(odometry, scale, frame);
-  stretch_ways(odometry, scale);
+  stretch(scale, &known->loaded);
+  gather_ways(odometry);
 }
 
 }  // namespace
@@ -247,37 +280,22 @@ bool is_reachable(const Odometry& odometry, const Frame& frame) {
          turn_between(from.axes, now.axes) <= kLargestSwing + 3 * (sigma0 + sigma1);
 }
 
-void stretch_ways(Odometry* odometry, double factor) {
-  for (ScaleEvidence* evidence : {&odometry->scale.height, &odometry->scale.velocity}) {
-    evidence->product *= factor;
-    evidence->square *= factor * factor;
-    evidence->noise *= factor * factor;
-  }
+ScaleEstimate height_estimate(const MetricScale& scale) {
+  return estimate_of(scale.height, TV_SCALE_HEIGHT);
 }
 
-// The residuals' sum of squares is chi2. Where it is larger than their number, the sensor errs more
-// than it states, and in proportion: heights have the steps of the ground. Where velocities have
-// other directions than the map, as those that come late, the slope of their ways over the map's is
-// too small, but that of the map's over theirs too large: what lies between the two, beyond the
-// stated noise, is uncertain, too. So is by how much the map's own errors make the slope too small;
-// in level flight the map climbs by little else, and heights say nothing.
-ScaleEstimate estimate_of(const ScaleEvidence& evidence, int32_t source) {
-  if (!(evidence.num > 0 && evidence.square > 2 * evidence.noise)) return {};
-  const double slope = evidence.product / evidence.square;
-  const double chi2 = evidence.total - slope * evidence.product;
-  const double num = std::max(evidence.num - 1, 1.0);
-  const double more = std::max(chi2 - num, 0.0);
-  const double between = more > 0 && source == TV_SCALE_VELOCITY ? more / evidence.product : 0;
-  const double bias = slope * evidence.noise / (evidence.square - evidence.noise);
-  const double share = 1 / (1 + more / num + (between * between + bias * bias) * evidence.square);
-  if (!(share > 0)) return {};
-  return {source, share * evidence.product, share * evidence.square};
+// Ways that contradict the map are outliers while those that agree say more. Else nobody knows
+// which are, and all of them count: velocities of the other sign then say a negative scale, and
+// those that fit no scale an uncertain one.
+ScaleEstimate velocity_estimate(const MetricScale& scale) {
+  ScaleEvidence evidence = scale.velocity;
+  if (scale.contrary.square > evidence.square) add_evidence(scale.contrary, &evidence);
+  return estimate_of(evidence, TV_SCALE_VELOCITY);
 }
 
 ScaleEstimate estimate_of(const MetricScale& scale) {
-  const ScaleEstimate a = estimate_of(scale.height, TV_SCALE_HEIGHT);
-  const ScaleEstimate b = estimate_of(scale.velocity, TV_SCALE_VELOCITY);
-  const int32_t source = a.source | b.source | scale.loaded;
+  const ScaleEstimate a = height_estimate(scale), b = velocity_estimate(scale);
+  const int32_t source = a.source | b.source | scale.loaded_source;
   return {source, a.product + b.product, a.square + b.square};
 }
 
@@ -286,27 +304,21 @@ MetricScale scale_of(const ScaleEstimate& estimate, int32_t source, double sigma
   scale.source = source;
   scale.sigma = sigma;
   if (!(estimate.square > 0)) return scale;
-  scale.loaded = estimate.source;
-  ScaleEvidence& of = estimate.source == TV_SCALE_HEIGHT ? scale.height : scale.velocity;
-  of.product = estimate.product;
-  of.square = estimate.square;
-  of.total = estimate.product / estimate.square * estimate.product;
-  of.num = 1;
+  scale.loaded_source = estimate.source;
+  scale.loaded.product = estimate.product;
+  scale.loaded.square = estimate.square;
+  scale.loaded.total = estimate.product / estimate.square * estimate.product;
+  scale.loaded.num = 1;
+  begin_sums(&scale);
   return scale;
 }
 
 void join_scale(const MetricScale& other, double scale, Odometry* odometry) {
   MetricScale* own = &odometry->scale;
-  const ScaleEvidence* from[2] = {&other.height, &other.velocity};
-  ScaleEvidence* to[2] = {&own->height, &own->velocity};
-  for (int k = 0; k < 2; ++k) {
-    ScaleEvidence more = *from[k];
-    more.product *= scale;
-    more.square *= scale * scale;
-    more.noise *= scale * scale;
-    add_evidence(more, 1, to[k]);
-  }
-  own->loaded |= other.loaded;
+  ScaleEvidence more = other.loaded;
+  stretch(scale, &more);
+  add_evidence(more, &own->loaded);
+  own->loaded_source |= other.loaded_source;
   own->is_contradicted |= other.is_contradicted;
 }
 
@@ -328,23 +340,26 @@ void change_scale(Odometry* odometry, int32_t from, int32_t to) {
   odometry->num_contrary = 0;
 }
 
-void add_ways(Odometry* odometry, double sign) {
-  for (int32_t k = 1; k < odometry->map.num_keyframes; ++k) add_way(odometry, k, sign);
+void gather_ways(Odometry* odometry) {
+  begin_sums(&odometry->scale);
+  for (int32_t k = 1; k < odometry->map.num_keyframes; ++k) add_way(odometry, k);
 }
 
 void measure_scale(Odometry* odometry, Frame* frame) {
   Map& map = odometry->map;
   MapKeyframe& newest = map.keyframes[map.num_keyframes - 1];
   const Travel& travel = odometry->travel;
-  if (travel.keyframe_id == (&newest)[-1].id && travel.is_known && travel.variance > 0) {
+  newest.is_followed = travel.keyframe_id == (&newest)[-1].id;
+  newest.is_contrary = travel.is_contrary;
+  if (newest.is_followed && travel.is_known && travel.variance > 0) {
     Rigid turn = newest.cam_from_world;
     std::fill_n(turn.t, 3, 0.0);
     transform(turn, travel.way_m, newest.way_m);
     newest.way_variance = travel.variance;
     const double clear = kClear * travel.bound_m;
-    odometry->velocity_trust += length_sq_of(travel.way_m) > clear * clear;
+    odometry->velocity_trust += !travel.is_contrary && length_sq_of(travel.way_m) > clear * clear;
   }
-  add_way(odometry, map.num_keyframes - 1, 1);
+  gather_ways(odometry);
   settle_scale(odometry, frame);
   begin_travel(odometry, newest.cam_from_world, newest.id);
 }

@@ -30,16 +30,12 @@ void add_reach(Odometry* odometry, const Frame& frame, bool gap);
 // Whether the sensors allow that a frame that was lost is where it was found. Places look alike.
 bool is_reachable(const Odometry& odometry, const Frame& frame);
 
-// Adds what the newest keyframe and the one before say of the scale, and gives the segment the
-// metre as its unit once the scale is known to a tenth.
+// The newest keyframe takes the way from the one before, as the velocities say it, and the segment
+// gets the metre as its unit once the scale is known to a tenth.
 void measure_scale(Odometry* odometry, Frame* frame);
 
-// Adds what the ways between the segment's keyframes, as they are now, say of the scale, or takes
-// it away with a sign of -1: before and after keyframes move against each other.
-void add_ways(Odometry* odometry, double sign);
-
-// The segment's unit became 1 / factor of what it was.
-void stretch_ways(Odometry* odometry, double factor);
+// Sums up what the ways between the segment's keyframes, as they are now, say of the scale.
+void gather_ways(Odometry* odometry);
 
 // What the evidence says: product / square is the scale, and 1 / square its variance. Of all of it
 // together, `source` (tv_scale_source) names the sensors that it is of.
@@ -47,7 +43,8 @@ struct ScaleEstimate {
   int32_t source;
   double product, square;
 };
-ScaleEstimate estimate_of(const ScaleEvidence& evidence, int32_t source);
+ScaleEstimate height_estimate(const MetricScale& scale);
+ScaleEstimate velocity_estimate(const MetricScale& scale);
 ScaleEstimate estimate_of(const MetricScale& scale);
 
 // The evidence that says this: as it is kept in a map's bytes, where a scale that was contradicted

@@ -74,7 +74,8 @@ struct Travel {
   int32_t keyframe_id;  // that it began at; -1: a frame that is no keyframe
   double from[3];       // the camera's centre there
   double way_m[3], variance;
-  double bound_m;  // its standard deviation if all errors are equal
+  double bound_m;    // its standard deviation if all errors are equal
+  bool is_contrary;  // the map's way to a frame since then contradicted it
 };
 
 // What the sensors say of a frame: the turn from the map's axes to those of its attitude, which
@@ -103,10 +104,13 @@ struct ScaleEvidence {
 };
 
 struct MetricScale {
-  int32_t source;        // tv_scale_source
-  int32_t loaded;        // the one of the evidence that a map's bytes brought
-  bool is_contradicted;  // heights and velocities contradict each other
-  ScaleEvidence height, velocity;
+  int32_t source;         // tv_scale_source
+  int32_t loaded_source;  // the one of what a map's bytes brought
+  bool is_contradicted;   // heights and velocities contradict each other
+  // What a map's bytes brought, and the sums over the keyframes' ways and that: of heights, of
+  // velocities, and of those ways that contradict the map and are left out as long as the others
+  // say more.
+  ScaleEvidence loaded, height, velocity, contrary;
   double sigma;  // relative; 0 where the source is TV_SCALE_UNIT
 };
 

@@ -169,6 +169,7 @@ void remove_unconfirmed(Odometry* odometry) {
     last = before;
   }
   remove_lone_points(&map);
+  gather_ways(odometry);  // what was wrong says nothing of the scale
   doubt(odometry, TV_REASON_TWO_PLANAR_SOLUTIONS);
   odometry->reference_id = last >= 0 ? map.keyframes[last].id : -1;
 }
@@ -181,7 +182,7 @@ bool heed_velocities(Odometry* odometry, const Frame& frame, uint32_t* reasons) 
     return true;
   }
   *reasons |= TV_REASON_SECOND_MOTION;
-  odometry->travel.keyframe_id = -1;  // says nothing of the scale
+  odometry->travel.is_contrary = true;
   if (odometry->velocity_trust < kLeastTrust || ++odometry->num_contrary < kMostContrary)
     return true;
   odometry->velocity_trust -= odometry->velocity_trust / 4;
@@ -438,8 +439,8 @@ __attribute__((noinline)) void write_counts(const Odometry& odometry, tv_odometr
   state->scale_source = odometry.scale.source;
   state->scale_sigma = odometry.scale.sigma;
   state->scale_contradicted = odometry.scale.is_contradicted;
-  const ScaleEstimate h = estimate_of(odometry.scale.height, TV_SCALE_HEIGHT);
-  const ScaleEstimate v = estimate_of(odometry.scale.velocity, TV_SCALE_VELOCITY);
+  const ScaleEstimate h = height_estimate(odometry.scale);
+  const ScaleEstimate v = velocity_estimate(odometry.scale);
   if (h.source != TV_SCALE_UNIT) {
     state->height_scale = h.product / h.square;
     state->height_scale_sigma = std::sqrt(1 / h.square);

@@ -78,19 +78,26 @@ Measurements::Sample Measurements::sample_of(const std::vector<double>& n,
     sample.world_from_body = {n[2], n[3], n[4], n[1]};
     sample.attitude_sigma_rad = n[5];
   }
-  if (is_known(n, 6, 7) && !(std::abs(n[6]) <= kMostHeightM)) {
-    ++num_impossible_heights_;
-  } else if (is_known(n, 6, 7)) {
+  if (is_known(n, 6, 7) && n[7] > 0) {
+    const bool is_possible = std::abs(n[6]) <= kMostHeightM;
+    ++heights_.measured;
+    heights_.impossible += !is_possible;
     sample.height_m = n[6];
-    sample.height_sigma_m = n[7];
+    sample.height_sigma_m = is_possible ? n[7] : 0;
   }
-  if (is_known(n, 8, 11) && !(std::hypot(n[8], n[9], n[10]) <= kMostSpeedMS)) {
-    ++num_impossible_velocities_;
-  } else if (is_known(n, 8, 11)) {
+  if (is_known(n, 8, 11) && n[11] > 0) {
+    const bool is_possible = std::hypot(n[8], n[9], n[10]) <= kMostSpeedMS;
+    ++velocities_.measured;
+    velocities_.impossible += !is_possible;
     sample.velocity_m_s = {n[8], n[9], n[10]};
-    sample.velocity_sigma_m_s = n[11];
+    sample.velocity_sigma_m_s = is_possible ? n[11] : 0;
   }
   return sample;
+}
+
+bool Measurements::are_metres() const {
+  return 2 * heights_.impossible <= heights_.measured &&
+         2 * velocities_.impossible <= velocities_.measured;
 }
 
 Measurements Measurements::read(const std::string& file) {
@@ -116,15 +123,20 @@ Measurements Measurements::read(const std::string& file) {
     found.samples_.push_back(sample);
   }
   if (!has_mount) throw BadInput(file + ": no line body_from_cam in it");
+  if (!found.are_metres())
+    for (Sample& sample : found.samples_) sample.height_sigma_m = sample.velocity_sigma_m_s = 0;
   return found;
 }
 
 std::string Measurements::note() const {
-  if (num_impossible_heights_ + num_impossible_velocities_ == 0) return {};
-  return file_ + ": of " + std::to_string(samples_.size()) + " samples " +
-         std::to_string(num_impossible_heights_) + " heights above 3000 m and " +
-         std::to_string(num_impossible_velocities_) +
-         " velocities above 150 m/s were left out: are they in metres?";
+  if (heights_.impossible + velocities_.impossible == 0) return {};
+  const std::string found = file_ + ": of " + std::to_string(samples_.size()) + " samples " +
+                            std::to_string(heights_.impossible) + " heights above 3000 m and " +
+                            std::to_string(velocities_.impossible) + " velocities above 150 m/s";
+  if (are_metres()) return found + " were left out: are they in metres?";
+  return found +
+         ": most are not in metres, so no height and no velocity is used, and the scale is "
+         "unknown";
 }
 
 void Measurements::add_to(SourceFrame& frame) const {

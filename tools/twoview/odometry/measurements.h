@@ -13,7 +13,8 @@ namespace cli {
 class Measurements {
  public:
   // Reads the file. Throws BadInput that names the line. A height or a velocity that no drone has
-  // (above 3000 m, 150 m/s) is none that was measured.
+  // (above 3000 m, 150 m/s) is none that was measured. Where most of the heights, or most of the
+  // velocities, are such ones, the file is not in metres, and neither counts.
   static Measurements read(const std::string& file);
 
   // Adds what was measured at the frame's time, in the camera's terms, between the two samples
@@ -35,11 +36,16 @@ class Measurements {
     double velocity_sigma_m_s = 0;
   };
   Sample sample_of(const std::vector<double>& numbers, const std::string& where);
+  bool are_metres() const;
 
   Matrix3 body_from_camera_{};
   std::vector<Sample> samples_;  // sorted by time
   std::string file_;
-  int num_impossible_heights_ = 0, num_impossible_velocities_ = 0;
+  // Of a quantity, how many were measured, and how many of these no drone has.
+  struct Count {
+    int measured = 0, impossible = 0;
+  };
+  Count heights_, velocities_;
 };
 
 }  // namespace cli
