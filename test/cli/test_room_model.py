@@ -13,8 +13,11 @@ import tempfile
 import unittest
 from pathlib import Path
 
+import numpy as np
+
 from cli_support import CliTest, main, png
-from test_odometry import CAMERAS, COUNT, FOCAL, PICTURES, SHIFTS, TIMES, TUM_TRUTH, poses
+from test_odometry import (CAMERAS, COUNT, FOCAL, HEIGHT, PICTURES, SHIFTS, TIMES, TUM_TRUTH, WIDTH,
+                           poses)
 
 STEP = 0.1  # units of the truth between two frames
 DEPTHS = [FOCAL * STEP / shift for shift in SHIFTS]  # of the walls
@@ -78,6 +81,96 @@ def read_glb(data):
     buffer_size, kind = struct.unpack("<I4s", data[start:start + 8])
     assert kind == b"BIN\0" and start + 8 + buffer_size == len(data)
     return json.loads(data[20:start]), data[start + 8:]
+
+
+# The walls: strips of the picture's height, x from what the first frame shows to what the last does.
+WALLS = [{"z": depth, "x": (-(WIDTH / 2) / FOCAL * depth, WIDTH / 2 / FOCAL * depth + STEP * (COUNT - 1)),
+          "y": tuple((edge * HEIGHT / len(DEPTHS) - HEIGHT / 2) / FOCAL * depth for edge in (k, k + 1))}
+         for k, depth in enumerate(DEPTHS)]
+QUADS = [[(w["x"][0], w["y"][0], w["z"]), (w["x"][1], w["y"][0], w["z"]),
+          (w["x"][1], w["y"][1], w["z"]), (w["x"][0], w["y"][1], w["z"])] for w in WALLS]
+
+
+def ply_mesh(kind="ascii", quads=True):
+    """The walls as a PLY file, as other programs write one: with more properties and elements, and
+    their faces as quadrilaterals or as triangles."""
+    corners = [p for quad in QUADS for p in quad]
+    faces = [f for k in range(len(QUADS)) for f in
+             ([(4 * k, 4 * k + 1, 4 * k + 2, 4 * k + 3)] if quads else
+              [(4 * k, 4 * k + 1, 4 * k + 2), (4 * k, 4 * k + 2, 4 * k + 3)])]
+    head = (f"ply\nformat {kind} 1.0\ncomment of a test\nelement vertex {len(corners)}\n"
+            "property double x\nproperty double y\nproperty uchar red\nproperty double z\n"
+            f"element face {len(faces)}\nproperty list uchar uint vertex_index\n"
+            "element edge 1\nproperty list short float lengths\nend_header\n").encode()
+    if kind == "ascii":
+        return head + "".join([f"{x!r} {y!r} 200 {z!r}\n" for x, y, z in corners] + [
+            " ".join(map(str, (len(f), *f))) + "\n" for f in faces] + ["2 0.5 1.5\n"]).encode()
+    order = "<" if kind == "binary_little_endian" else ">"
+    return (head + b"".join(struct.pack(order + "ddBd", x, y, 200, z) for x, y, z in corners) +
+            b"".join(struct.pack(f"{order}B{len(f)}I", len(f), *f) for f in faces) +
+            struct.pack(order + "hff", 2, 0.5, 1.5))
+
+
+def depth_picture(levels=2000, shift=0):
+    """The true depth of each frame: the walls are strips of the picture."""
+    return png(WIDTH, HEIGHT, [round(levels * DEPTHS[y * len(DEPTHS) // HEIGHT]) + shift
+                               for y in range(HEIGHT) for _ in range(WIDTH)], depth=16)
+
+
+def away_from_walls(points):
+    """The distance of each point to the nearest wall."""
+    nearest = np.full(len(points), np.inf)
+    for wall in WALLS:
+        beyond = [np.maximum(0, np.maximum(wall[axis][0] - points[:, k], points[:, k] - wall[axis][1]))
+                  for k, axis in enumerate("xy")]
+        nearest = np.minimum(nearest, np.sqrt(beyond[0] ** 2 + beyond[1] ** 2 +
+                                              (points[:, 2] - wall["z"]) ** 2))
+    return nearest
+
+
+def away_from_triangle(points, corners):
+    """The distance of each point to the triangle, from the definition: to its plane where the foot
+    lies within, else to the nearest edge."""
+    a, b, c = corners
+    normal = np.cross(b - a, c - a)
+    normal /= np.linalg.norm(normal)
+    inside = np.ones(len(points), bool)
+    nearest = np.full(len(points), np.inf)
+    for p, q in ((a, b), (b, c), (c, a)):
+        inside &= np.cross(q - p, points - p) @ normal >= 0
+        share = np.clip((points - p) @ (q - p) / ((q - p) @ (q - p)), 0, 1)
+        nearest = np.minimum(nearest, np.linalg.norm(points - p - share[:, None] * (q - p), axis=1))
+    return np.where(inside, np.abs((points - a) @ normal), nearest)
+
+
+def brute_force_scores(out, within=0.05):
+    """Precision, recall and medians of a room of true poses beside the walls, by counting."""
+    _, vertices, faces = read_ply(out / "room.ply")
+    places = np.array([(v["x"], v["y"], v["z"]) for v in vertices])
+    corners = places[np.array(faces)]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    rng = np.random.default_rng(5)
+    chosen = rng.choice(len(corners), 60000, p=area / area.sum())
+    u, v = np.sort(rng.random((2, len(chosen))), axis=0)
+    weights = np.stack([u, v - u, 1 - v], 1)
+    away = away_from_walls(np.einsum("ij,ijk->ik", weights, corners[chosen]))
+    # True points: as many to the square metre on each wall, seen by at least two frames.
+    points = np.array([(x, y, w["z"]) for w in WALLS for x in np.arange(w["x"][0] + 0.05, w["x"][1], 0.1)
+                       for y in np.arange(w["y"][0] + 0.05, w["y"][1], 0.1)])
+    eyes = STEP * np.arange(COUNT)
+    column = FOCAL * (points[:, :1] - eyes) / points[:, 2:] + (WIDTH - 1) / 2
+    row = FOCAL * points[:, 1] / points[:, 2] + (HEIGHT - 1) / 2
+    seen = ((column >= 0) & (column < WIDTH)).sum(1) >= 2
+    points = points[seen & (row >= 0) & (row < HEIGHT)]
+    missing = np.full(len(points), np.inf)
+    for triangle in corners[area > 0]:
+        near = np.flatnonzero(((points > triangle.min(0) - 0.3) & (points < triangle.max(0) + 0.3)).all(1))
+        if len(near):
+            missing[near] = np.minimum(missing[near], away_from_triangle(points[near], triangle))
+    precision, recall = (away <= within).mean(), (missing <= within).mean()
+    return {"precision_5cm": precision, "recall_5cm": recall,
+            "f_5cm": 2 * precision * recall / (precision + recall),
+            "accuracy_median": np.median(away), "completeness_median": np.median(missing)}
 
 
 class RoomTest(CliTest):
@@ -284,6 +377,110 @@ class RoomTest(CliTest):
         self.assert_refused(self.room("--poses", late, folder=self.source), "no pose has the time")
         self.write("binary/images.bin", b"x")
         self.assert_refused(self.room(folder=self.folder / "binary"), "model_converter")
+
+    # -- beside the truth -----------------------------------------------------------------------
+
+    def truth(self, *more, **options):
+        done = self.succeed(self.room(*more, **options))
+        self.assertIn("truth        F ", done.stdout.decode())
+        return self.result()["room"]["truth"]
+
+    def of_true_poses(self, *more):
+        return self.truth("--poses", self.source / "groundtruth.txt", *more, folder=self.source)
+
+    def test_the_scores_are_those_of_counting_by_brute_force(self):
+        truth = self.of_true_poses("--truth-mesh", self.write("walls.ply", ply_mesh()))
+        for key, expected in brute_force_scores(self.out).items():
+            self.assertAlmostEqual(truth[key], expected, delta=0.015, msg=key)
+            self.assertIn(key, truth["registered"])
+        self.assertGreater(truth["f_5cm"], 0.3)
+        self.assertLess(truth["f_5cm"], 0.95)  # so that the comparison says something
+        self.assertEqual(truth["measured_precision_5cm"], truth["precision_5cm"])
+        self.assertIsNone(truth["inferred_precision_5cm"])
+        self.assertEqual((truth["placed_by"], truth["share_judged"]), ("the given poses", 1))
+        self.assertIn("Beside the true surface", (self.out / "report.html").read_text())
+
+    def test_every_form_of_ply_is_the_same_truth(self):
+        found = []
+        for kind, quads in (("ascii", False), ("binary_little_endian", True),
+                            ("binary_big_endian", True)):
+            truth = self.of_true_poses("--truth-mesh", self.write("w.ply", ply_mesh(kind, quads)))
+            found.append({key: truth[key] for key in ("precision_5cm", "accuracy_median", "f_5cm")})
+        self.assertEqual(found[1], found[2])
+        for key, value in found[0].items():
+            self.assertAlmostEqual(value, found[1][key], delta=0.005)
+
+    def test_a_truth_that_is_moved_is_found_by_registering(self):
+        moved = ply_mesh().decode().split("end_header\n")
+        lines = moved[1].splitlines()
+        for k in range(4 * len(WALLS)):
+            x, y, red, z = lines[k].split()
+            lines[k] = f"{x} {y} {red} {float(z) + 0.1}"
+        mesh = self.write("moved.ply", moved[0] + "end_header\n" + "\n".join(lines) + "\n")
+        truth = self.of_true_poses("--truth-mesh", mesh)
+        own = self.of_true_poses("--truth-mesh", self.write("walls.ply", ply_mesh()))
+        self.assertLess(truth["f_5cm"], 0.6 * own["f_5cm"])
+        self.assertAlmostEqual(truth["registered"]["precision_5cm"],
+                               own["registered"]["precision_5cm"], delta=0.02)
+
+    def test_a_flight_is_placed_by_its_true_path(self):
+        mesh = self.write("walls.ply", ply_mesh())
+        truth = self.truth("--truth-mesh", mesh)  # the odometry knew groundtruth.txt
+        self.assertEqual(truth["placed_by"], "the true path")
+        self.assertGreater(truth["f_5cm"], 0.3)
+        self.assertEqual(truth, self.truth("--truth-mesh", mesh, "--truth",
+                                           self.source / "groundtruth.txt"))
+        both = self.folder / "both"
+        self.succeed(self.run_program("odometry", self.source, "-o", both, "--room", "--truth-mesh", mesh))
+        self.assertAlmostEqual(self.result(both)["room"]["truth"]["f_5cm"], truth["f_5cm"], delta=0.03)
+
+    def depth_folder(self, name="depth", **options):
+        for i in range(0, COUNT, 3):
+            self.write(f"{name}/{i:05}.png", depth_picture(**options))
+        return self.folder / name
+
+    def test_true_depths_say_what_a_true_mesh_says(self):
+        folder = self.depth_folder()
+        by_mesh = self.of_true_poses("--truth-mesh", self.write("walls.ply", ply_mesh()))
+        truth = self.of_true_poses("--truth-depth", folder, "--truth-scale", "2000")
+        for key in ("precision_5cm", "recall_5cm", "f_5cm"):
+            self.assertAlmostEqual(truth[key], by_mesh[key], delta=0.08, msg=key)
+        self.assertGreater(truth["share_judged"], 0.9)
+        # Without a true path the frames' own poses serve, with a scale fitted to the map's points.
+        result = json.loads((self.flight / "result.json").read_text())
+        alone = self.folder / "alone"
+        shutil.copytree(self.flight, alone)
+        result["options"]["truth"] = None
+        self.write("alone/result.json", json.dumps(result))
+        own = self.truth("--truth-depth", folder, "--truth-scale", "2000", folder=alone)
+        self.assertIn("fitted to the map's points", own["placed_by"])
+        self.assertGreater(own["f_5cm"], 0.3)
+        self.assert_refused(self.room("--truth-mesh", self.folder / "walls.ply", folder=alone,
+                                      out=self.folder / "other"),
+                            "--truth is required", out=self.folder / "other")
+
+    def test_a_truth_that_is_none_is_refused(self):
+        def refused(words, *more):
+            self.assert_refused(self.room(*more), words)
+        whole = ply_mesh("binary_little_endian")
+        for data, words in ((b"solid\n", "no PLY"), (whole[:-40], "truncated"), (whole[:60], "header"),
+                            (whole.replace(b"element face 5", b"element face 0"), "faces"),
+                            (ply_mesh().replace(b"4 0 1 2 3", b"4 0 1 2 99"), "99 of 20"),
+                            (ply_mesh().replace(b"property double z", b"property double w"), "x y z"),
+                            (ply_mesh().replace(b" 200 ", b" nan ", 1), "nan")):
+            refused(words, "--truth-mesh", self.write("bad.ply", data))
+        refused("gone.ply", "--truth-mesh", self.folder / "gone.ply")
+        refused("truth-scale", "--truth-depth", self.depth_folder())
+        (self.folder / "empty").mkdir()
+        refused("holds no pictures", "--truth-depth", self.folder / "empty", "--truth-scale", "1")
+        refused("cannot read", "--truth-depth", self.folder / "gone", "--truth-scale", "1")
+        self.write("grey/00000.png", PICTURES[0])
+        refused("16 bits", "--truth-depth", self.folder / "grey", "--truth-scale", "1")
+        self.write("other/cat.png", depth_picture())
+        refused("belongs to a frame", "--truth-depth", self.folder / "other", "--truth-scale", "1")
+        self.write("shape/00000.png", png(10, 240, [9] * 2400, depth=16))
+        refused("shape", "--truth-depth", self.folder / "shape", "--truth-scale", "1")
+        refused("--truth is for", "--truth", self.source / "groundtruth.txt")
 
     # -- what cannot make a room ------------------------------------------------------------------
 

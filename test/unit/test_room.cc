@@ -402,6 +402,11 @@ void test_small_pieces_are_left_out() {
   mesh(room);
   TEST_ASSERT_EQUAL(0, vertices_near(1.5));
   TEST_ASSERT_TRUE(vertices_near(2.007) > 1000);
+  // With the pieces go their vertices: each that is left is of a triangle.
+  std::vector<bool> is_used(vertices.size());
+  for (const tv_room_triangle& t : triangles)
+    for (const int32_t idx : t.idx_vertex) is_used[static_cast<size_t>(idx)] = true;
+  for (const bool used : is_used) TEST_ASSERT_TRUE(used);
 }
 
 // ---- Planes, and what is inferred along them.

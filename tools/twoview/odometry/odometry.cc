@@ -73,6 +73,7 @@ struct Arguments {
 #ifdef TWOVIEW_HAS_ROOM
   bool makes_room = false;
   RoomSettings room;
+  RoomTruthOptions room_truth;
 #endif
 #ifdef TWOVIEW_HAS_DRONE
   DroneAddress drone;  // without a host: none
@@ -220,7 +221,7 @@ nlohmann::ordered_json options_of(const Arguments& a, const std::string& truth_f
   json["truth"] = text_or_null(truth_file);
 #ifdef TWOVIEW_HAS_ROOM
   json["room"] = nullptr;
-  if (a.makes_room) json["room"] = room_options_json(a.room);
+  if (a.makes_room) json["room"] = room_options_json(a.room, a.room_truth);
 #endif
   return json;
 }
@@ -255,7 +256,7 @@ struct FlightRoom {
 #ifdef TWOVIEW_HAS_ROOM
 // What goes wrong with the room is noted, and the flight's results are written all the same.
 FlightRoom room_of(Arguments& a, FrameSource& source, FlightResult& result,
-                   const std::atomic<bool>& stop) {
+                   const TrueRoom& true_room, const std::atomic<bool>& stop) {
   FlightRoom room;
   result.json["room"] = nullptr;
   if (!a.makes_room) return room;
@@ -274,6 +275,12 @@ FlightRoom room_of(Arguments& a, FrameSource& source, FlightResult& result,
   } catch (const BadInput& e) {
     a.common.note(std::string("no room: ") + e.what());
     return room;
+  }
+  if (true_room.is_given()) {
+    const auto surface = [&] {
+      return true_room.surface(room.scene, {false, result.truth, result.truth_note});
+    };
+    add_truth(surface, room.scene, *room.model, !a.common.quiet, a.common);
   }
   for (const std::string& note : room_notes(*room.model, stop)) a.common.note(note);
   if (const int count = result.json["num_segments"].get<int>(); count > 1)
@@ -491,6 +498,10 @@ int odometry(Arguments& a) {
         "first");
 #endif
   const std::string truth_file = a.truth.empty() ? source->truth_file() : a.truth;
+#ifdef TWOVIEW_HAS_ROOM
+  const TrueRoom true_room(a.room_truth);
+  if (!a.room_truth.mesh.empty() && truth_file.empty()) throw BadInput(kMeshNeedsPath);
+#endif
   std::optional<TruePoses> truth;
   if (!truth_file.empty())
     truth = load_trajectory(truth_file, source->times(), source->body_from_camera());
@@ -501,6 +512,9 @@ int odometry(Arguments& a) {
   for (const std::string& name : source->files()) files.keep(name);
   files.keep(camera_path(a.camera));
   files.keep(truth_file);
+#ifdef TWOVIEW_HAS_ROOM
+  for (const std::string& name : true_room.files()) files.keep(name);
+#endif
   std::vector<std::string> names = own_files();
   for (const std::string& name : ColmapFolder::file_names()) names.push_back("colmap/" + name);
   files.require_own({"odometry", names, kAlwaysFiles, {}});
@@ -546,7 +560,7 @@ int odometry(Arguments& a) {
   if (!result.truth_note.empty()) common.note(result.truth_note);
   if (!flight.still_mask().empty()) common.note(still_note(result));
 #ifdef TWOVIEW_HAS_ROOM
-  const FlightRoom room = room_of(a, *source, result, stop);
+  const FlightRoom room = room_of(a, *source, result, true_room, stop);
   std::optional<DepthFolder> depth;
   if (room.model) depth.emplace(files.folder(), *room.model);
 #else
@@ -636,7 +650,7 @@ void add_odometry(CLI::App& program, Run& run) {
 #ifdef TWOVIEW_HAS_ROOM
   CLI::Option* room = verb->add_flag("--room", a->makes_room,
                                      "make the surface of the room as well, as twoview room does");
-  for (CLI::Option* option : add_room_options(*verb, a->room)) option->needs(room);
+  for (CLI::Option* option : add_room_options(*verb, a->room, a->room_truth)) option->needs(room);
 #endif
 #ifdef TWOVIEW_HAS_DRONE
   verb->add_option("--drone", a->drone.host, "in place of SOURCE: the address of an AR.Drone")

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "base/error.h"
 #include "base/terminal.h"
 #include "pair/options.h"
 #include "room_model/room_files.h"
@@ -28,7 +29,8 @@ std::vector<std::string> depth_names(const fs::path& folder) {
 
 }  // namespace
 
-std::vector<CLI::Option*> add_room_options(CLI::App& verb, RoomSettings& settings) {
+std::vector<CLI::Option*> add_room_options(CLI::App& verb, RoomSettings& settings,
+                                           RoomTruthOptions& truth) {
   constexpr int kMostMiB = 65536;
   CLI::Option* voxel =
       add_number(verb, "voxel", &settings.voxel, 1e-6, 1e6,
@@ -41,16 +43,20 @@ std::vector<CLI::Option*> add_room_options(CLI::App& verb, RoomSettings& setting
       "only what was measured; this version infers nothing, so this is what it always does");
   CLI::Option* depth = verb.add_flag("--depth-maps", settings.keeps_depth_maps,
                                      "write the keyframes' depth maps to depth/, 16 bits");
-  return {voxel, memory, measured, depth};
+  std::vector<CLI::Option*> added = {voxel, memory, measured, depth};
+  for (CLI::Option* option : add_truth_options(verb, truth)) added.push_back(option);
+  return added;
 }
 
-nlohmann::ordered_json room_options_json(const RoomSettings& settings) {
+nlohmann::ordered_json room_options_json(const RoomSettings& settings,
+                                         const RoomTruthOptions& truth) {
   nlohmann::ordered_json json;
   json["voxel"] = nullptr;
   if (settings.voxel > 0) json["voxel"] = settings.voxel;
   json["max_memory"] = settings.max_memory_mib;
   json["measured_only"] = settings.measured_only;
   json["depth_maps"] = settings.keeps_depth_maps;
+  json.update(truth_options_json(truth));
   return json;
 }
 
@@ -69,6 +75,16 @@ void read_pictures_with_progress(FrameSource& source, const Masks& masks, const 
 RoomModel finish_with_progress(RoomBuilder& builder, bool speaks) {
   const Stopwatch watch(speaks, "room: the surface");
   return builder.finish();
+}
+
+void add_truth(const std::function<TrueSurface()>& surface, const RoomScene& scene,
+               RoomModel& model, bool speaks, Common& common) {
+  const Stopwatch watch(speaks, "room: comparing with the true surface");
+  try {
+    model.truth = compared(scene, model, surface());
+  } catch (const BadInput& e) {
+    common.note(std::string("no comparison with the truth: ") + e.what());
+  }
 }
 
 std::vector<std::string> room_notes(const RoomModel& model, bool was_stopped) {

@@ -3,6 +3,7 @@
 
 #include <CLI/App.hpp>
 #include <atomic>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -11,18 +12,28 @@
 #include "base/output.h"
 #include "odometry/frames.h"
 #include "odometry/room_source.h"
+#include "odometry/room_truth.h"
 #include "room_model/builder.h"
+#include "verbs/common.h"
 
 namespace cli {
 
-// --voxel, --max-memory, --measured-only and --depth-maps; the options that were added.
-std::vector<CLI::Option*> add_room_options(CLI::App& verb, RoomSettings& settings);
-nlohmann::ordered_json room_options_json(const RoomSettings& settings);
+// --voxel, --max-memory, --measured-only, --depth-maps and those of the truth; the options that
+// were added.
+std::vector<CLI::Option*> add_room_options(CLI::App& verb, RoomSettings& settings,
+                                           RoomTruthOptions& truth);
+nlohmann::ordered_json room_options_json(const RoomSettings& settings,
+                                         const RoomTruthOptions& truth);
 
 // read_room_pictures with a progress line on a terminal.
 void read_pictures_with_progress(FrameSource& source, const Masks& masks, const cv::Mat& still,
                                  RoomBuilder& builder, const std::atomic<bool>& stop, bool speaks);
 RoomModel finish_with_progress(RoomBuilder& builder, bool speaks);
+
+// Compares the model with the true surface. What goes wrong with that is noted, and the room's
+// results are written all the same.
+void add_truth(const std::function<TrueSurface()>& surface, const RoomScene& scene,
+               RoomModel& model, bool speaks, Common& common);
 
 // What the user must know of the model, as lines without an end.
 std::vector<std::string> room_notes(const RoomModel& model, bool was_stopped);

@@ -165,6 +165,7 @@ RoomSource room_source_of_flight(const std::string& folder, const std::string& m
                    " (--source gives the place where it is now; a live source cannot be read "
                    "again)");
   fit_as_tracked(*made.source, camera_file);
+  made.truth_file = text_of(options.value("truth", Json()));
   const int segment = json["longest_segment"].get<int>();
   const std::vector<SegmentPose> keys = read_poses(file("keyframes.txt"));
   std::set<std::string> key_times;
@@ -175,8 +176,10 @@ RoomSource room_source_of_flight(const std::string& folder, const std::string& m
   for (const SegmentPose& pose : read_poses(file("trajectory.txt"))) {
     const auto found = frames.find(pose.time);
     if (pose.segment != segment || found == frames.end()) continue;
+    double time_s = 0;
+    to_number(pose.time, time_s);
     made.scene.views.push_back({found->second.first, found->second.second, pose.pose.R, pose.pose.t,
-                                key_times.count(pose.time) != 0});
+                                key_times.count(pose.time) != 0, time_s});
     indices.insert(found->second.first);
   }
   if (made.scene.views.empty()) throw BadInput(folder + " has no frame with a pose");
@@ -242,7 +245,7 @@ RoomSource room_source_of_poses(const std::string& path, const std::string& pose
     const Pose& pose = path_of_file[pair.idx_truth].pose;
     const std::string name = pair.idx_estimate < names.size() ? names[pair.idx_estimate]
                                                               : "frame " + std::to_string(index);
-    made.scene.views.push_back({index, name, pose.R, pose.t, true});
+    made.scene.views.push_back({index, name, pose.R, pose.t, true, times[pair.idx_estimate]});
     wanted.insert(index);
   }
   if (made.scene.views.empty())
@@ -256,6 +259,7 @@ RoomSource room_source_of_poses(const std::string& path, const std::string& pose
   made.name = fs::absolute(fs::path(path) / "x").parent_path().filename().string();
   for (const std::string& name : source.files()) made.files.push_back(name);
   made.files.push_back(poses);
+  made.has_true_poses = true;
   made.notes.emplace_back(
       "the unit is that of the poses: whether it is the metre is not known here");
   return made;
@@ -303,7 +307,7 @@ RoomSource room_source_of_colmap(const std::string& model, const std::string& pi
       continue;
     }
     const Pose pose = inverse({rotation_of_quaternion(n[2], n[3], n[4], n[1]), {n[5], n[6], n[7]}});
-    views.push_back({found->second, found->first, pose.R, pose.t, true});
+    views.push_back({found->second, found->first, pose.R, pose.t, true, 0});
   }
   if (views.empty())
     throw BadInput("none of the pictures of " + file("images.txt") + " is in " + pictures);
@@ -316,6 +320,20 @@ RoomSource room_source_of_colmap(const std::string& model, const std::string& pi
   for (const char* name : {"cameras.txt", "images.txt", "points3D.txt"})
     made.files.push_back(file(name));
   return made;
+}
+
+TruePath true_path(const RoomSource& from, const std::string& file) {
+  TruePath path;
+  path.is_own = file.empty() && from.has_true_poses;
+  const std::string name = file.empty() ? from.truth_file : file;
+  if (path.is_own || name.empty()) return path;
+  TruePoses truth = load_trajectory(name, from.source->times(), from.source->body_from_camera());
+  Trajectory own;
+  for (const RoomView& view : from.scene.views) own.push_back({view.time_s, {view.R, view.t}});
+  const std::optional<FilmFacts> film = from.source->film();
+  path.problem = fit_times(own, truth, film ? film->clock_start_s : 0);
+  path.poses = truth.poses;
+  return path;
 }
 
 void add_posed_points(RoomSource& from, const std::atomic<bool>& stop) {
@@ -346,8 +364,8 @@ RoomScene room_scene(const FlightResult& result) {
   for (size_t k = 0; k < flight.frames().size(); ++k) {
     const FlightFrame& frame = flight.frames()[k];
     if (frame.origin == PoseOrigin::kNone || frame.segment != result.segment) continue;
-    scene.views.push_back(
-        {frame.index, frame.name, frame.pose.R, frame.pose.t, key_frames.count(k) != 0});
+    scene.views.push_back({frame.index, frame.name, frame.pose.R, frame.pose.t,
+                           key_frames.count(k) != 0, frame.time_s});
   }
   for (const tv_map_point& point : result.points)
     if (point.segment == result.segment)

@@ -9,6 +9,7 @@
 #include "files/mask_file.h"
 #include "odometry/frames.h"
 #include "odometry/outputs.h"
+#include "odometry/room_truth.h"
 #include "room_model/builder.h"
 
 namespace cli {
@@ -21,6 +22,8 @@ struct RoomSource {
   cv::Mat still;                   // what stands still in all of them, 0; may be empty
   std::string name;                // of the source, for people
   std::string given;               // as the user or result.json names it
+  std::string truth_file;          // of true poses, that result.json names; empty: none
+  bool has_true_poses = false;     // the poses are given ones, which a truth is in the frame of
   std::vector<std::string> files;  // that were read, which no output may replace
   std::vector<std::string> notes;
 };
@@ -37,6 +40,9 @@ RoomSource room_source_of_poses(const std::string& source, const std::string& po
 // A model of COLMAP as text (cameras.txt, images.txt, points3D.txt) of one camera, and the folder
 // of its pictures.
 RoomSource room_source_of_colmap(const std::string& model, const std::string& pictures);
+
+// The true poses of the source's frames: of `file`, else those that the source knows, else none.
+TruePath true_path(const RoomSource& from, const std::string& file);
 
 // Finds points for a scene without any, by matching its pictures.
 void add_posed_points(RoomSource& from, const std::atomic<bool>& stop);

@@ -23,6 +23,8 @@ struct Arguments {
   std::string folder, source, poses, camera;
   double fps = 0;
   RoomSettings settings;
+  RoomTruthOptions truth;
+  std::string true_poses;
 };
 
 const char* const kNoSurface = "no surface: nothing was measured by two keyframes";
@@ -69,17 +71,25 @@ RoomSource source_of(const Arguments& a, const std::atomic<bool>& stop) {
 
 int room(Arguments& a) {
   Common& common = a.common;
+  const TrueRoom true_room(a.truth);
+  if (!a.true_poses.empty() && !true_room.is_given())
+    throw BadInput("--truth is for --truth-mesh and --truth-depth");
   const std::atomic<bool>& stop = stop_flag_for_signals();
   RoomSource from = source_of(a, stop);
+  std::optional<TrueSurface> truth;
+  if (true_room.is_given()) truth = true_room.surface(from.scene, true_path(from, a.true_poses));
   OutputSet files(common.output);
   for (const std::string& name : from.files) files.keep(name);
+  for (const std::string& name : true_room.files()) files.keep(name);
+  for (const std::string& name : {from.truth_file, a.true_poses}) files.keep(name);
   std::vector<std::string> names = kRoomFiles;
   names.insert(names.end(), {"result.json", "report.html"});
   files.require_own({"room", names, {"result.json"}, {"frames.csv"}});
   RoomBuilder builder(from.scene, a.settings);
   read_pictures_with_progress(*from.source, from.masks, from.still, builder, stop, !common.quiet);
-  const RoomModel model = finish_with_progress(builder, !common.quiet);
+  RoomModel model = finish_with_progress(builder, !common.quiet);
   from.scene = builder.scene();
+  if (truth) add_truth([&truth] { return *truth; }, from.scene, model, !common.quiet, common);
   for (const std::string& mask : from.masks.files()) files.keep(mask);
   for (const std::string& note : from.notes) common.note(note);
   for (const std::string& note : room_notes(model, stop)) common.note(note);
@@ -91,10 +101,12 @@ int room(Arguments& a) {
                                                    : nlohmann::ordered_json(nullptr);
   json["notes"] = common.notes;
   json["interrupted"] = stop.load();
-  json["options"] = room_options_json(a.settings);
+  json["options"] = room_options_json(a.settings, a.truth);
   json["options"]["folder"] = a.folder;
   json["options"]["poses"] = nullptr;
   if (!a.poses.empty()) json["options"]["poses"] = a.poses;
+  json["options"]["truth"] = nullptr;
+  if (!a.true_poses.empty()) json["options"]["truth"] = a.true_poses;
   json["version"] = tv_version_string();
   files.add("result.json", json_text(json));
   files.add("report.html", room_report(from.scene, model, from.name, common.notes, json));
@@ -135,7 +147,11 @@ void add_room(CLI::App& program, Run& run) {
   add_number(*verb, "fps", &a->fps, 0.001, 10000,
              "frames a second, with --poses, of images without times")
       ->default_str("");
-  add_room_options(*verb, a->settings);
+  verb->add_option("--truth", a->true_poses,
+                   "true poses of the frames (TUM, EuRoC or KITTI), for --truth-mesh and "
+                   "--truth-depth; without: those of the flight's source")
+      ->type_name("FILE");
+  add_room_options(*verb, a->settings, a->truth);
   add_common(*verb, a->common, 0, "folder for the results");
   verb->final_callback([a, &run] { run = [a] { return room(*a); }; });
 }

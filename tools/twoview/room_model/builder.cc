@@ -63,22 +63,6 @@ cv::Mat small_copy(const cv::Mat& picture, const tv_camera& camera, int interpol
   return copy;
 }
 
-// The vertices of pieces that tv_room_mesh leaves out stay in its list.
-void leave_out_loose_vertices(RoomMesh& mesh) {
-  std::vector<int32_t> renamed(mesh.vertices.size(), -1);
-  for (const tv_room_triangle& triangle : mesh.triangles)
-    for (const int32_t idx : triangle.idx_vertex) renamed[static_cast<size_t>(idx)] = 0;
-  int32_t count = 0;
-  for (size_t i = 0; i < renamed.size(); ++i) {
-    if (renamed[i] < 0) continue;
-    renamed[i] = count;
-    mesh.vertices[static_cast<size_t>(count++)] = mesh.vertices[i];
-  }
-  mesh.vertices.resize(static_cast<size_t>(count));
-  for (tv_room_triangle& triangle : mesh.triangles)
-    for (int32_t& idx : triangle.idx_vertex) idx = renamed[static_cast<size_t>(idx)];
-}
-
 }  // namespace
 
 RoomBuilder::RoomBuilder(RoomScene scene, const RoomSettings& settings)
@@ -257,7 +241,8 @@ RoomMesh RoomBuilder::mesh() const {
                           mesh.triangles.data(), num_triangles, &num_vertices, &num_triangles);
   }
   check(status, "the surface");
-  leave_out_loose_vertices(mesh);
+  mesh.vertices.resize(static_cast<size_t>(num_vertices));
+  mesh.triangles.resize(static_cast<size_t>(num_triangles));
   return mesh;
 }
 

@@ -87,7 +87,30 @@ std::string cards(const RoomScene& scene, const RoomModel& model, const RoomPlan
   const double all = static_cast<double>(std::max<int64_t>(1, model.pixels.total()));
   text += card(formatted("%.0f", 100 * static_cast<double>(model.pixels.measured) / all), "%",
                "of their pixels measured");
+  if (model.truth)
+    text += card(formatted("%.3f", model.truth->placed.f), "", "F at 5 cm beside the true surface");
   return "<div class=\"cards\">\n" + text + "</div>\n";
+}
+
+std::string truth_section(const RoomModel& model) {
+  if (!model.truth) return "";
+  const auto row = [](const char* name, const TruthScores& s) {
+    const auto cell = [](const std::optional<double>& value, double factor, const char* format) {
+      return "<td>" + (value ? formatted(format, factor * *value) : std::string("-")) + "</td>";
+    };
+    return "<tr><th>" + std::string(name) + "</th>" + cell(s.precision, 1, "%.3f") +
+           cell(s.precision_measured, 1, "%.3f") + cell(s.precision_inferred, 1, "%.3f") +
+           cell(s.recall, 1, "%.3f") + cell(s.f, 1, "%.3f") +
+           cell(s.accuracy_median, 100, "%.1f cm") + cell(s.completeness_median, 100, "%.1f cm") +
+           "</tr>\n";
+  };
+  return "<h2>Beside the true surface</h2>\n<table>\n<tr><th></th><th>precision at 5 cm</th>"
+         "<th>of what was measured</th><th>of what was inferred</th><th>recall</th><th>F</th>"
+         "<th>median distance to the truth</th><th>from the truth</th></tr>\n" +
+         row("as placed", model.truth->placed) + row("registered", model.truth->registered) +
+         "</table>\n<p class=\"hint\">Placed by " + escaped(model.truth->placed_by) +
+         ". Registered: after the similarity that fits the surface best. Recall is of what two "
+         "keyframes could see.</p>\n";
 }
 
 std::string missing_section(const RoomModel& model) {
@@ -127,7 +150,7 @@ RoomSection room_section(const RoomScene& scene, const RoomModel& model) {
       "<figcaption>Dark lines are walls, thinner ones other upright planes, grey whatever else "
       "stands upright; the light area was looked across; the path is "
       "blue.</figcaption></figure>\n" +
-      missing_section(model) + "</section>\n";
+      missing_section(model) + truth_section(model) + "</section>\n";
   section.script = "<script type=\"application/json\" id=\"room-data\">" +
                    surface_json(scene, model).dump() + "</script>\n<script>\n" + kGesturesScript +
                    kRoomScript + "</script>\n";

@@ -8,6 +8,7 @@
 #include "files/image_file.h"
 #include "room_model/plan.h"
 #include "room_model/surface_files.h"
+#include "room_model/truth.h"
 
 namespace cli {
 
@@ -69,7 +70,7 @@ Json room_json(const RoomScene& scene, const RoomModel& model) {
                           {"image_size", {c.width, c.height}},
                           {"camera_matrix", {c.fx, 0, c.cx, 0, c.fy, c.cy, 0, 0, 1}}};
   }
-  json["truth"] = nullptr;
+  json["truth"] = model.truth ? truth_json(*model.truth) : Json(nullptr);
   return json;
 }
 
@@ -153,6 +154,7 @@ std::string room_summary(const RoomScene& scene, const RoomModel& model) {
                    100 * static_cast<double>(model.pixels.measured) / all);
   for (const std::string& words : missing_words(model))
     text += summary_line("missing", "%s", words.c_str());
+  if (model.truth) text += summary_line("truth", "%s", truth_words(*model.truth).c_str());
   text += summary_line("room work",
                        "%.0f ms a keyframe for depth, %.1f ms for fusion, %.0f ms for the surface "
                        "(CPU), in %.0f MiB",

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/matrix.h"
+#include "room_model/truth_scores.h"
 #include "twoview/camera.h"
 #include "twoview/room.h"
 
@@ -21,6 +22,7 @@ struct RoomView {
   Matrix3 R{1, 0, 0, 0, 1, 0, 0, 0, 1};
   Vector3 t{0, 0, 0};
   bool is_keyframe = false;  // gets a depth map
+  double time_s = 0;         // of the frame, where the source has times
 };
 
 // The frames of one segment, in the order in which their pictures come, and points that they see.
@@ -96,6 +98,7 @@ struct RoomModel {
   PixelCounts pixels;
   tv_camera map_camera{};                // of the depth maps
   std::vector<DepthPicture> depth_maps;  // where they are kept
+  std::optional<RoomTruth> truth;        // beside the true surface, where that is known
 };
 
 }  // namespace cli

@@ -42,13 +42,13 @@ def measure(folder, out, arguments):
         found = flight.longest(poses.read_tum(os.path.join(out, "trajectory.txt")))
         scale, R, t = flight.world_from_map(found, sets.read_set(folder).truth())
     positions = scale * made.vertices["position"].astype(float) @ R.T + t
-    used = [index for index, *_ in made.keyframes]
+    keys = source.keyframes  # all of them: what they could see is to be there
     samples = truth.sample_boxes(boxes, 0.03)
-    seen = truth.seen_twice(boxes, samples, source.camera, R @ source.R[used],
-                            scale * source.centres[used] @ R.T + t)
+    seen = truth.seen_twice(boxes, samples, source.camera, R @ source.R[keys],
+                            scale * source.centres[keys] @ R.T + t)
     row = truth.scores(boxes, samples[seen], positions, made.vertices["inferred"] > 0,
                        made.triangles, WITHIN)
-    return {**row, "keyframes": len(used), "voxel": made.voxel, "vertices": len(positions),
+    return {**row, "keyframes": len(made.keyframes), "voxel": made.voxel, "vertices": len(positions),
             "ms_depth": made.ms_depth, "ms_fusion": made.ms_fusion, "ms_mesh": made.ms_mesh}
 
 

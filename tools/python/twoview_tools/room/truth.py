@@ -8,6 +8,8 @@ from scipy.spatial import cKDTree
 from ..odometry import surfaces
 
 SPACING = 0.02  # metres between samples of a surface
+NEAR = 0.01  # the same where the nearest sample stands for the surface itself
+MARGIN = 0.05  # metres: what stands nearer before a point does not hide it, as in `twoview room`
 
 
 def sample_boxes(boxes, spacing=SPACING):
@@ -43,7 +45,8 @@ def is_blocked(boxes, eye, points):
             high = (np.asarray(box["half"]) - start) / ray
         enter = np.nanmax(np.minimum(low, high), 1)
         leave = np.nanmin(np.maximum(low, high), 1)
-        blocked |= (enter < leave) & (enter < 0.995) & (leave > 0)
+        end = 1 - MARGIN / np.linalg.norm(points - eye, axis=1)
+        blocked |= (enter < leave) & (enter < end) & (leave > 0)
     return blocked
 
 
@@ -83,7 +86,8 @@ def scores(boxes, true_points, positions, inferred, triangles, within=0.05):
     points, chosen = sample_mesh(positions, triangles)
     is_inferred = inferred[triangles].any(1)[chosen]
     right = surfaces.distances(boxes, points) <= within
-    away, _ = cKDTree(points).query(true_points, distance_upper_bound=10 * within)
+    finer, _ = sample_mesh(positions, triangles, NEAR)
+    away, _ = cKDTree(finer).query(true_points, distance_upper_bound=10 * within)
     precision, recall = float(right.mean()), float((away <= within).mean())
     share = lambda mask: float(right[mask].mean()) if mask.any() else None
     return {"precision": precision, "recall": recall,
