@@ -22,11 +22,13 @@ using tv::Mat3;
 using tv::Vec3;
 
 constexpr int kWidth = 320, kHeight = 240, kViews = 5;
+// Enough that the larger map of a lens that bends lines outwards is not reduced.
+constexpr int kMapPixels = kWidth * kHeight * 3 / 2;
 
-alignas(64) uint8_t memory[40 << 20];
+alignas(64) uint8_t memory[56 << 20];
 uint8_t pixels[kViews][kWidth * kHeight];
-float distances[kWidth * kHeight], sigmas[kWidth * kHeight];
-uint8_t witnesses[kWidth * kHeight], grey[kWidth * kHeight];
+float distances[kMapPixels], sigmas[kMapPixels];
+uint8_t witnesses[kMapPixels], grey[kMapPixels];
 
 tv_camera camera_of(int model, std::initializer_list<double> k) {
   tv_camera camera = {model, kWidth, kHeight, 0, 260, 262, 163, 117, {}};
@@ -74,24 +76,27 @@ Figures measure(const char* name, const tv_camera& camera, const Pose* poses, in
   }
   tv_depth_options options;
   tv_depth_options_init(&options);
+  // Sigmas are in planes, which come in eights: 40 of them for each lens's map, about a pixel
+  // apart.
   options.near_depth = 1.8;
   options.far_depth = 9;
   options.max_views = num_views;
+  options.max_pixels = kMapPixels;
   size_t bytes = 0;
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_depth_size(&camera, &options, &bytes));
   TEST_ASSERT_TRUE(bytes <= sizeof memory);
   tv_camera map_camera;
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_depth_map_camera(&camera, &options, &map_camera));
-  TEST_ASSERT_EQUAL_INT(kWidth, map_camera.width);
-  TEST_ASSERT_EQUAL_INT(kHeight, map_camera.height);
+  const int width = map_camera.width, height = map_camera.height;
+  TEST_ASSERT_TRUE(width >= kWidth && height >= kHeight && width * height <= kMapPixels);
   const tv_depth_arrays arrays = {distances, sigmas, witnesses, grey};
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_sweep_depth(views, num_views, &options, memory, bytes, &arrays));
   const tv::Camera prepared = tv::prepare_camera(map_camera);
   std::vector<double> errors, in_sigma;
   int inside = 0;
-  for (int y = 0; y < kHeight; ++y) {
-    for (int x = 0; x < kWidth; ++x) {
-      const int i = y * kWidth + x;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const int i = y * width + x;
       Vec3 ray;
       TEST_ASSERT_TRUE(tv::unproject(prepared, tv::Vec2(x, y), &ray, nullptr));
       const double truth = distance_to_scene(Vec3(0, 0, 0), ray);
@@ -140,6 +145,39 @@ void test_depths_are_the_scenes_through_every_lens(void) {
          0.9);
 }
 
+// What the image shows in the middle of its edges, the map shows, too: to within five of its
+// pixels, since the optical axis lies in its middle. A pinhole keeps its focal length. A fisheye's
+// map has at least half the focal length, so that its middle stays sharp.
+void test_the_map_shows_what_a_bent_lens_shows(void) {
+  const tv_camera lenses[] = {
+      camera_of(TV_CAMERA_PINHOLE, {}),
+      camera_of(TV_CAMERA_BROWN_CONRADY, {-0.28, 0.07, 0.001, -0.001, 0}),
+      camera_of(TV_CAMERA_BROWN_CONRADY, {0.08, -0.12, 0, 0, 0}),
+      camera_of(TV_CAMERA_KANNALA_BRANDT, {-0.03, 0.01, 0, 0}),
+  };
+  for (const tv_camera& lens : lenses) {
+    tv_camera map;
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_depth_map_camera(&lens, nullptr, &map));
+    TEST_ASSERT_TRUE(map.fx == map.fy && map.fx > 0.7 * lens.fx && map.fx <= 261);
+    TEST_ASSERT_TRUE(map.fx == 261 || lens.model != TV_CAMERA_PINHOLE);
+    const tv::Camera prepared = tv::prepare_camera(lens), of_map = tv::prepare_camera(map);
+    const double right = lens.width - 1, low = lens.height - 1;
+    for (const tv::Vec2& edge : {tv::Vec2(0, lens.cy), tv::Vec2(right, lens.cy),
+                                 tv::Vec2(lens.cx, 0), tv::Vec2(lens.cx, low)}) {
+      Vec3 ray;
+      tv::Vec2 pixel;
+      TEST_ASSERT_TRUE(tv::unproject(prepared, edge, &ray, nullptr));
+      TEST_ASSERT_TRUE(tv::project(of_map, ray, &pixel, nullptr));
+      TEST_ASSERT_TRUE(pixel[0] >= -8 && pixel[0] <= map.width + 7);
+      TEST_ASSERT_TRUE(pixel[1] >= -8 && pixel[1] <= map.height + 7);
+    }
+  }
+  tv_camera fisheye = camera_of(TV_CAMERA_KANNALA_BRANDT, {0, 0, 0, 0}), map;
+  fisheye.fx = fisheye.fy = 100;  // 183 degrees across
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_depth_map_camera(&fisheye, nullptr, &map));
+  TEST_ASSERT_TRUE(map.fx == 50);
+}
+
 // Along the optical axis there is no parallax, so that fewer pixels are known.
 void test_depths_are_the_scenes_where_the_camera_moves_ahead(void) {
   const Figures f = measure("ahead", camera_of(TV_CAMERA_PINHOLE, {}), kAhead, 5);
@@ -182,7 +220,7 @@ void test_few_witnesses_are_a_warning(void) {
 
 // Exchanged partners are the same evidence.
 void test_the_order_of_the_other_views_does_not_matter(void) {
-  static float first[kWidth * kHeight];
+  static float first[kWidth * kHeight];  // of a pinhole, whose map is as large as its picture
   const tv_camera camera = camera_of(TV_CAMERA_PINHOLE, {});
   measure("in order", camera, kAround, 5);
   std::memcpy(first, distances, sizeof first);
@@ -220,6 +258,7 @@ void test_the_order_of_the_other_views_does_not_matter(void) {
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_depths_are_the_scenes_through_every_lens);
+  RUN_TEST(test_the_map_shows_what_a_bent_lens_shows);
   RUN_TEST(test_depths_are_the_scenes_where_the_camera_moves_ahead);
   RUN_TEST(test_two_views_are_enough);
   RUN_TEST(test_few_witnesses_are_a_warning);

@@ -28,7 +28,8 @@ typedef struct tv_depth_options {
   /* The caller's sizeof, set by tv_depth_options_init. */
   uint32_t struct_size;
   /* The most pixels of the map, [1024, 4194304], default 76800. The map is as large as the
-     reference image, or reduced to so many pixels. Time and memory grow in proportion. */
+     reference image (tv_depth_map_camera), or reduced to so many pixels. Time and memory grow in
+     proportion. */
   int32_t max_pixels;
   /* The most planes, [16, 256], default 96, rounded down to a multiple of 8. Two neighbouring
      planes are a pixel of the map apart in the image with the longest baseline, or farther where
@@ -79,9 +80,11 @@ typedef struct tv_depth_arrays {
 } tv_depth_arrays;
 
 /* Writes the camera of the map to *map_camera: a pinhole with the reference's optical axis in the
-   middle, of its aspect ratio and focal length but for the reduction. What a distorted or wide lens
-   sees beyond this pinhole's image has no depth. options: null means the defaults; near_depth and
-   far_depth are not read. Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (an option),
+   middle, of its aspect ratio and focal length but for the reduction. Where the lens bends lines
+   outwards, the map is larger across, down or both by what the lens sees more than a pinhole in the
+   middle of the image's edges, at most twice, before it is reduced. What the image shows in its
+   corners beyond this has no depth. options: null means the defaults; near_depth and far_depth are
+   not read. Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (an option),
    TV_ERR_NOT_FINITE (an option), TV_ERR_CAMERA. */
 TV_API tv_status tv_depth_map_camera(const tv_camera *reference, const tv_depth_options *options,
                                      tv_camera *map_camera);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 
 #include "api/sized.h"
 #include "api/validate.h"
@@ -41,11 +42,40 @@ tv_status check_reference(const tv_camera* camera) {
   return camera->width > kMaxSide || camera->height > kMaxSide ? TV_ERR_CAMERA : TV_OK;
 }
 
+// How many times as far as through a pinhole of the camera's focal length things lie apart that the
+// image shows in the middle of two opposite edges, [1, 2]: a lens that bends lines outwards sees
+// more. Beyond twice, the middle of the map would become too coarse.
+double field_of(const Camera& lens, bool across) {
+  constexpr double kMost = 2;
+  const tv_camera& camera = lens.model;
+  const double last = (across ? camera.width : camera.height) - 1.0;
+  double apart = 0;
+  for (const double end : {0.0, last}) {
+    const Vec2 edge(across ? end : camera.cx, across ? camera.cy : end);
+    Vec3 ray;
+    if (!unproject(lens, edge, &ray, nullptr) || !(ray[2] > 0)) return kMost;
+    apart = (across ? ray[0] : ray[1]) / ray[2] - apart;
+  }
+  const double of_pinhole = last / (across ? camera.fx : camera.fy);
+  return std::max(1.0, apart < kMost * of_pinhole ? apart / of_pinhole : kMost);
+}
+
+// The grid of at most max_pixels pixels that shows what the image shows in the middle of its edges.
+MapGrid grid_of(tv_camera camera, const tv_depth_options& options) {
+  if (camera.model != TV_CAMERA_PINHOLE) {
+    const Camera lens = prepare_camera(camera);
+    const double across = field_of(lens, true), down = field_of(lens, false);
+    camera.width = static_cast<int32_t>(camera.width * across);
+    camera.height = static_cast<int32_t>(camera.height * down);
+  }
+  return map_grid_of(camera, options.max_pixels);
+}
+
 // The bytes of the stages for a view of this camera as the reference; other views may be up to
 // kMaxSide pixels large, but only their reduced image takes memory, at most four times the
 // samples of the view.
 size_t depth_bytes(const tv_camera& camera, const tv_depth_options& options) {
-  const MapGrid grid = map_grid_of(camera, options.max_pixels);
+  const MapGrid grid = grid_of(camera, options);
   ParallelView reference, other;
   size_parallel_view(grid, false, &reference);
   size_parallel_view(grid, true, &other);
@@ -168,7 +198,7 @@ tv_status tv_depth_map_camera(const tv_camera* reference, const tv_depth_options
   tv_status status = tv::read_options(options, &checked);
   if (status == TV_OK) status = tv::check_reference(reference);
   if (status == TV_OK) {
-    *map_camera = tv::map_camera_of(tv::map_grid_of(*reference, checked.max_pixels));
+    *map_camera = tv::map_camera_of(tv::grid_of(*reference, checked));
   }
   return status;
 }
@@ -207,7 +237,7 @@ tv_status tv_sweep_depth(const tv_depth_view* views, int32_t num_views,
   }
   if (reinterpret_cast<uintptr_t>(memory) % TV_CONTEXT_ALIGNMENT != 0) return TV_ERR_ALIGNMENT;
   if (size_bytes < tv::depth_bytes(*views[0].camera, checked)) return TV_ERR_MEMORY;
-  const tv::MapGrid grid = tv::map_grid_of(*views[0].camera, checked.max_pixels);
+  const tv::MapGrid grid = tv::grid_of(*views[0].camera, checked);
   const size_t pixels = static_cast<size_t>(grid.width) * static_cast<size_t>(grid.height);
   status = tv::check_overlap(views, num_views, pixels, *arrays, memory, size_bytes);
   if (status != TV_OK) return status;
