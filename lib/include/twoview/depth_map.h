@@ -81,11 +81,10 @@ typedef struct tv_depth_arrays {
 
 /* Writes the camera of the map to *map_camera: a pinhole with the reference's optical axis in the
    middle, of its aspect ratio and focal length but for the reduction. Where the lens bends lines
-   outwards, the map is larger across, down or both by what the lens sees more than a pinhole in the
-   middle of the image's edges, at most twice, before it is reduced. What the image shows in its
-   corners beyond this has no depth. options: null means the defaults; near_depth and far_depth are
-   not read. Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (an option),
-   TV_ERR_NOT_FINITE (an option), TV_ERR_CAMERA. */
+   outwards, the map is larger across, down or both by what the lens sees more than a pinhole at the
+   image's edges, corners included, at most twice, before it is reduced. options: null means the
+   defaults; near_depth and far_depth are not read. Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE,
+   TV_ERR_ARGUMENT (an option), TV_ERR_NOT_FINITE (an option), TV_ERR_CAMERA. */
 TV_API tv_status tv_depth_map_camera(const tv_camera *reference, const tv_depth_options *options,
                                      tv_camera *map_camera);
 

@@ -43,21 +43,33 @@ tv_status check_reference(const tv_camera* camera) {
 }
 
 // How many times as far as through a pinhole of the camera's focal length things lie apart that the
-// image shows in the middle of two opposite edges, [1, 2]: a lens that bends lines outwards sees
-// more. Beyond twice, the middle of the map would become too coarse.
+// image shows at two opposite edges, in their middle or in the corners, [1, 2]: a lens that bends
+// lines outwards sees more. Beyond twice, the middle of the map would become too coarse.
 double field_of(const Camera& lens, bool across) {
   constexpr double kMost = 2;
   const tv_camera& camera = lens.model;
-  const double last = (across ? camera.width : camera.height) - 1.0;
-  double apart = 0;
-  for (const double end : {0.0, last}) {
-    const Vec2 edge(across ? end : camera.cx, across ? camera.cy : end);
-    Vec3 ray;
-    if (!unproject(lens, edge, &ray, nullptr) || !(ray[2] > 0)) return kMost;
-    apart = (across ? ray[0] : ray[1]) / ray[2] - apart;
+  const double right = camera.width - 1, low = camera.height - 1;
+  const double of_pinhole = across ? right / camera.fx : low / camera.fy;
+  double most = of_pinhole;
+  for (int k = 0; k < 3; ++k) {
+    const double along = across ? (k == 0   ? camera.cy
+                                   : k == 1 ? 0
+                                            : low)
+                                : (k == 0   ? camera.cx
+                                   : k == 1 ? 0
+                                            : right);
+    const Vec2 first = across ? Vec2(0, along) : Vec2(along, 0);
+    const Vec2 last = across ? Vec2(right, along) : Vec2(along, low);
+    Vec3 a, b;
+    const int axis = across ? 0 : 1;
+    if (!unproject(lens, first, &a, nullptr) || !unproject(lens, last, &b, nullptr) ||
+        !(a[2] > 0 && b[2] > 0)) {
+      if (k == 0) return kMost;
+      continue;  // a corner beyond the lens's valid angle
+    }
+    most = std::max(most, b[axis] / b[2] - a[axis] / a[2]);
   }
-  const double of_pinhole = last / (across ? camera.fx : camera.fy);
-  return std::max(1.0, apart < kMost * of_pinhole ? apart / of_pinhole : kMost);
+  return std::min(most / of_pinhole, kMost);
 }
 
 // The grid of at most max_pixels pixels that shows what the image shows in the middle of its edges.
