@@ -18,8 +18,9 @@ class Twoview(ConanFile):
     topics = ("computer-vision", "geometry", "embedded")
     package_type = "library"
     settings = "os", "arch", "compiler", "build_type"
-    options = {"shared": [True, False], "odometry": [True, False], "dense": [True, False]}
-    default_options = {"shared": False, "odometry": True, "dense": True}
+    options = {"shared": [True, False], "odometry": [True, False], "dense": [True, False],
+               "room": [True, False]}
+    default_options = {"shared": False, "odometry": True, "dense": True, "room": True}
 
     def set_version(self):
         header = load(self, os.path.join(ROOT, "lib", "include", "twoview", "version.h"))
@@ -41,7 +42,8 @@ class Twoview(ConanFile):
         toolchain.cache_variables.update({
             "TWOVIEW_TOOLS": "OFF", "TWOVIEW_DRIVERS": "OFF", "BUILD_TESTING": "OFF",
             "TWOVIEW_ODOMETRY": bool(self.options.odometry),
-            "TWOVIEW_DENSE": bool(self.options.dense)})
+            "TWOVIEW_DENSE": bool(self.options.dense),
+            "TWOVIEW_ROOM": bool(self.options.room)})
         toolchain.generate()
 
     def build(self):

@@ -4,9 +4,11 @@ are is known exactly. Files are read by this test's own readers."""
 import json
 import math
 import os
+import pty
 import re
 import resource
 import shutil
+import signal
 import struct
 import subprocess
 import tempfile
@@ -15,8 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cli_support import CliTest, main, png
-from test_odometry import (CAMERAS, COUNT, FOCAL, HEIGHT, PICTURES, SHIFTS, TIMES, TUM_TRUTH, WIDTH,
+from cli_support import CliTest, main, png, program
+from test_odometry import (CAMERAS, COUNT, FOCAL, HEIGHT, LUMA, PICTURES, SHIFTS, TIMES, TUM_TRUTH, WIDTH,
                            poses)
 
 STEP = 0.1  # units of the truth between two frames
@@ -530,6 +532,68 @@ class RoomTest(CliTest):
         self.assert_refused(self.room(folder=self.folder / "other"), "not of twoview odometry")
         self.write("other/result.json", "no json")
         self.assert_refused(self.room(folder=self.folder / "other"), "not of twoview odometry")
+
+    def test_a_flight_in_which_nothing_was_tracked(self):
+        plain = self.folder / "plain"
+        shutil.copytree(self.source, plain)
+        for i in range(COUNT):
+            (plain / f"images/{i:05}.png").write_bytes(PICTURES[0])
+        lost = self.folder / "lost"
+        self.assertEqual(self.run_program("odometry", plain, "-o", lost).returncode, 3)
+        self.assert_refused(self.room(folder=lost), "nothing could be tracked")
+
+    def test_two_segments_in_different_units_are_not_mixed(self):
+        two = self.folder / "two"
+        shutil.copytree(self.source, two)
+        lines = (two / "frames.txt").read_text()
+        for k in range(COUNT, 2 * COUNT):  # after a covered lens another scene: the first, mirrored
+            rows = [LUMA[k - COUNT][y * WIDTH:][:WIDTH][::-1] for y in range(HEIGHT)]
+            data = bytes(WIDTH * HEIGHT) if k < COUNT + 3 else b"".join(rows)
+            (two / f"images/{k:05}.png").write_bytes(png(WIDTH, HEIGHT, data))
+            lines += f"{k / 25:.9f} images/{k:05}.png\n"
+        (two / "frames.txt").write_text(lines)
+        flight = self.folder / "flight"
+        self.run_program("odometry", two, "-o", flight)
+        self.assertEqual(self.result(flight)["num_segments"], 2)
+        done = self.succeed(self.room(folder=flight))
+        self.assertIn("2 segments whose units and places do not compare", done.stdout.decode())
+        self.assert_walls(self.out, self.scale(), share=0.8)
+
+    def test_pictures_that_have_gone_are_counted(self):
+        moved = self.folder / "moved"
+        shutil.copytree(self.source, moved)
+        for i in range(COUNT // 2, COUNT):
+            (moved / f"images/{i:05}.png").unlink()
+        done = self.room("--source", moved)
+        self.assertIn("could not be read", done.stdout.decode() + done.stderr.decode())
+        if done.returncode != 2:
+            self.assertGreater(self.result()["room"]["pictures_missing"], 0)
+
+    def test_ctrl_c_keeps_what_there_is(self):
+        # Forth and back several times, so that the signal comes before the end.
+        long, order = self.folder / "long", [*range(COUNT), *range(COUNT - 2, 0, -1)] * 8
+        shutil.copytree(self.source, long)
+        (long / "frames.txt").write_text("".join(
+            f"{k / 25:.9f} images/{i:05}.png\n" for k, i in enumerate(order)))
+        path = self.write("path.txt", "".join(f"{k / 25:.9f} {STEP * i} 0 0 0 0 0 1\n"
+                                              for k, i in enumerate(order)))
+        master, slave = pty.openpty()
+        process = subprocess.Popen(
+            [program(), "room", long, "--poses", path, "-o", self.out], stdout=subprocess.PIPE,
+            stderr=slave, env={**os.environ, "TERM": "xterm"})
+        os.close(slave)
+        shown = b""
+        while not re.search(rb"room: [1-9]\d* of \d+ keyframes", shown):
+            shown += os.read(master, 4096)
+        process.send_signal(signal.SIGINT)
+        said = process.stdout.read().decode()
+        self.assertEqual(process.wait(timeout=60), 0)
+        process.stdout.close()
+        os.close(master)
+        result = self.result()
+        self.assertTrue(result["interrupted"])
+        self.assertIn("interrupted: the room is of what had been read until then", said)
+        self.assertGreater(len(read_ply(self.out / "room.ply")[2]), 1000)
 
     def test_a_source_that_has_gone_or_moved(self):
         moved = self.folder / "moved"

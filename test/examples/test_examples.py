@@ -178,6 +178,24 @@ class Examples(unittest.TestCase):
         symbols = run("nm", "--undefined-only", self.bin / "10_static_memory")
         self.assertNotRegex(symbols, r"\b(malloc|calloc|realloc)\b")
 
+    def test_room(self):
+        if not (self.bin / "17_room").exists():
+            self.skipTest("built without the room")
+        out = self.folder / "room.obj"
+        text = self.example("17_room", out)
+        self.assertIn("none of the heap", text)
+        lines = [line.split() for line in out.read_text().splitlines()]
+        vertices = np.array([line[1:] for line in lines if line[0] == "v"], float)
+        self.assertEqual(sum(line[0] == "f" for line in lines), number(r"(\d+) triangles", text))
+        wall, pillar = np.abs(vertices[:, 2] - 2) < 0.03, np.abs(vertices[:, 2] - 1.5) < 0.03
+        self.assertGreater((wall | pillar).mean(), 0.85)
+        self.assertGreater(pillar.mean(), 0.05)
+        self.assertGreater(np.ptp(vertices[wall, 0]), 2)  # metres of wall
+        symbols = run("nm", "--undefined-only", self.bin / "17_room")
+        self.assertNotRegex(symbols, r"\b(malloc|calloc|realloc)\b")
+        self.assertIn("usage", self.example("17_room", status=2))
+        self.assertIn("cannot write", self.example("17_room", "/nowhere/room.obj", status=2))
+
     def flight(self, name):
         """40 pictures of a flight of 2 m past a wall of tiles with a nearer half."""
         if not (self.bin / name).exists():
@@ -325,8 +343,8 @@ class Examples(unittest.TestCase):
                 if not (self.bin / source.stem).exists():
                     continue
                 packages += ["twoview_ardrone", "twoview_h264"]
-            odometry = ("13_odometry", "15_absolute_pose", "16_frame_loop")
-            if source.stem in odometry and not (self.bin / source.stem).exists():
+            optional = ("13_odometry", "15_absolute_pose", "16_frame_loop", "17_room")
+            if source.stem in optional and not (self.bin / source.stem).exists():
                 continue
             flags = run("pkg-config", "--cflags", "--libs", *packages, env=environment).split()
             run(CC, "-std=c11", source, "-o", self.folder / "alone", *flags, "-lm")

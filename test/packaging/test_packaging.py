@@ -65,12 +65,12 @@ class Versions(Case):
         self.assertIn(f"\nTWOVIEW_VERSION = {VERSION}\n",
                       (PACKAGING / "buildroot/twoview.mk").read_text())
 
-    def test_every_recipe_can_leave_out_the_dense_cloud_and_odometry(self):
+    def test_every_recipe_can_leave_out_the_dense_cloud_odometry_and_room(self):
         cmake = (SOURCE / "CMakeLists.txt").read_text()
         for recipe in ("conan/conanfile.py", "vcpkg/twoview/portfile.cmake",
                        f"yocto/twoview_{VERSION}.bb", "buildroot/twoview.mk"):
             text = (PACKAGING / recipe).read_text()
-            for option in ("TWOVIEW_DENSE", "TWOVIEW_ODOMETRY"):
+            for option in ("TWOVIEW_DENSE", "TWOVIEW_ODOMETRY", "TWOVIEW_ROOM"):
                 self.assertIn(f"option({option} ", cmake)
                 self.assertIn(option, text, recipe)
         port = json.loads((PACKAGING / "vcpkg/twoview/vcpkg.json").read_text())

@@ -166,6 +166,8 @@ RoomSource room_source_of_flight(const std::string& folder, const std::string& m
                    "again)");
   fit_as_tracked(*made.source, camera_file);
   made.truth_file = text_of(options.value("truth", Json()));
+  if (!json["longest_segment"].is_number_integer() || json["longest_segment"].get<int>() < 0)
+    throw BadInput(folder + " holds no path: nothing could be tracked in that flight");
   const int segment = json["longest_segment"].get<int>();
   const std::vector<SegmentPose> keys = read_poses(file("keyframes.txt"));
   std::set<std::string> key_times;
