@@ -171,6 +171,7 @@ void settle_scale(Odometry* odometry, Frame* frame) {
   const double scale = now.product / now.square;
   known->sigma = std::sqrt(variance + kScaleError * kScaleError);
   known->source = now.source;
+  known->was_known = true;
   if (std::fabs(scale - 1) < kLeastChange) return;
   rescale(odometry, scale, frame);
   stretch(scale, &known->loaded);
@@ -302,6 +303,7 @@ ScaleEstimate estimate_of(const MetricScale& scale) {
 MetricScale scale_of(const ScaleEstimate& estimate, int32_t source, double sigma) {
   MetricScale scale{};
   scale.source = source;
+  scale.was_known = source != TV_SCALE_UNIT;
   scale.sigma = sigma;
   if (!(estimate.square > 0)) return scale;
   scale.loaded_source = estimate.source;
@@ -320,6 +322,7 @@ void join_scale(const MetricScale& other, double scale, Odometry* odometry) {
   add_evidence(more, &own->loaded);
   own->loaded_source |= other.loaded_source;
   own->is_contradicted |= other.is_contradicted;
+  own->was_known |= other.was_known;
 }
 
 void change_scale(Odometry* odometry, int32_t from, int32_t to) {

@@ -107,6 +107,7 @@ struct MetricScale {
   int32_t source;         // tv_scale_source
   int32_t loaded_source;  // the one of what a map's bytes brought
   bool is_contradicted;   // heights and velocities contradict each other
+  bool was_known;         // the metre has been the unit
   // What a map's bytes brought, and the sums over the keyframes' ways and that: of heights, of
   // velocities, and of those ways that contradict the map and are left out as long as the others
   // say more.

@@ -186,8 +186,7 @@ bool heed_velocities(Odometry* odometry, const Frame& frame, uint32_t* reasons) 
   if (odometry->velocity_trust < kLeastTrust || ++odometry->num_contrary < kMostContrary)
     return true;
   odometry->velocity_trust -= odometry->velocity_trust / 4;
-  if (odometry->scale.source == TV_SCALE_UNIT && !odometry->scale.is_contradicted)
-    odometry->confirmed_id = -1;
+  if (!odometry->scale.was_known && !odometry->scale.is_contradicted) odometry->confirmed_id = -1;
   remove_unconfirmed(odometry);
   return false;
 }
