@@ -175,6 +175,35 @@ class FilmPairs {
   std::vector<Pair> pairs_;
 };
 
+// The keyframes with how they moved from the frame before them to the frame after, as both were
+// tracked: what a rolling shutter makes of it is a part of the adjustment.
+std::vector<LensKeyframe> in_motion(const std::vector<FlightKeyframe>& keyframes,
+                                    const Flight& flight) {
+  std::vector<LensKeyframe> moving;
+  const std::vector<FlightFrame>& frames = flight.frames();
+  for (const FlightKeyframe& key : keyframes) {
+    moving.push_back({&key, {}, {}});
+    const size_t at = flight.index_given(key.keyframe.frame);
+    const int32_t segment = frames[at].live_segment;
+    const auto follows = [&](size_t n) {
+      return n < frames.size() && segment >= 0 && frames[n].live_segment == segment;
+    };
+    const size_t first = at > 0 && follows(at - 1) ? at - 1 : at;
+    const size_t last = follows(at + 1) ? at + 1 : at;
+    if (first == last) continue;
+    const double share = 1.0 / static_cast<double>(last - first);
+    const Pose last_from_first = composed(inverse(frames[last].live), frames[first].live);
+    const std::array<double, 4> q = quaternion_of(last_from_first.R);
+    const double sine = std::hypot(std::hypot(q[0], q[1]), q[2]);
+    const double angle_over_sine = sine > 1e-12 ? 2 * std::atan2(sine, q[3]) / sine : 2;
+    for (size_t k = 0; k < 3; ++k) {
+      moving.back().turn[k] = share * angle_over_sine * q[k];
+      moving.back().move[k] = share * last_from_first.t[k];
+    }
+  }
+  return moving;
+}
+
 }  // namespace
 
 nlohmann::ordered_json FilmLens::json() const {
@@ -184,12 +213,13 @@ nlohmann::ordered_json FilmLens::json() const {
           {"sigma_percent", 100 * sigma},
           {"uncertain", is_uncertain},
           {"k1", lens.k1 != 0 ? Json(lens.k1) : Json(nullptr)},
+          {"k2", lens.k2 != 0 ? Json(lens.k2) : Json(nullptr)},
           {"source", "estimated"}};
 }
 
 std::string FilmLens::words() const {
-  char text[160], of_lens[48] = "";
-  if (lens.k1 != 0) std::snprintf(of_lens, sizeof of_lens, ", k1 %.3f", lens.k1);
+  char text[160], of_lens[64] = "";
+  if (lens.k1 != 0) std::snprintf(of_lens, sizeof of_lens, ", k1 %.3f, k2 %.3f", lens.k1, lens.k2);
   std::snprintf(text, sizeof text, "focal length %.3g mm (35 mm equivalent) +- %.1f %%%s",
                 focal_35mm(), 100 * sigma, of_lens);
   return text;
@@ -236,13 +266,13 @@ FilmLens estimate_film_lens(FrameSource& source, const FlightOptions& options,
     check(tv_odometry_finish(flight.odometry()), "the map");
     const tv_camera& camera = flight.camera();
     const double scale = static_cast<double>(camera.width) / result.width;
-    const LensEstimate estimate =
-        adjust_lens(flight.keyframes(), flight.points(), camera.width, camera.height,
-                    {scale * result.lens.focal_px, result.lens.k1});
+    const std::vector<FlightKeyframe> keyframes = flight.keyframes();
+    const SimpleLens start = result.lens.scaled(scale);
+    const LensEstimate estimate = adjust_lens(in_motion(keyframes, flight), flight.points(),
+                                              camera.width, camera.height, start);
     if (!estimate.is_known) break;
-    const double focal_px = estimate.lens.focal_px / scale;
-    const double change = std::log(focal_px / result.lens.focal_px);
-    result.lens = {focal_px, estimate.lens.k1};
+    const double change = std::log(estimate.lens.focal_px / start.focal_px);
+    result.lens = estimate.lens.scaled(1 / scale);
     result.sigma = std::min(std::hypot(std::sqrt(estimate.focal_variance), kRemembered * change),
                             kPriorLogFocal);
     if (std::fabs(change) < kSettled) break;

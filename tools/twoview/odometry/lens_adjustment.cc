@@ -9,9 +9,18 @@
 namespace cli {
 namespace {
 
+// The parameters that all windows share: the logarithm of the focal length, the lens's two
+// coefficients, the principal point's distance from the middle of the picture over the focal
+// length, and the time from the picture's first row to its last over that between two frames.
+enum Parameter { kFocal, kK1, kK2, kCx, kCy, kReadout, kParameters };
+using Lens = cv::Matx<double, kParameters, 1>;
+using LensMatrix = cv::Matx<double, kParameters, kParameters>;
+
 using Matx23 = cv::Matx<double, 2, 3>;
 using Matx26 = cv::Matx<double, 2, 6>;
-using Matx62 = cv::Matx<double, 6, 2>;
+using Matx2L = cv::Matx<double, 2, kParameters>;
+using MatxL3 = cv::Matx<double, kParameters, 3>;
+using Matx6L = cv::Matx<double, 6, kParameters>;
 using Matx63 = cv::Matx<double, 6, 3>;
 using Matx66 = cv::Matx<double, 6, 6>;
 using Vec6 = cv::Matx<double, 6, 1>;
@@ -23,18 +32,21 @@ using Vec2 = cv::Matx21d;
 constexpr size_t kWindow = 16, kLeastViews = 3, kMostWindows = 15;
 constexpr double kLossScale = 1;  // pixels of sigma 1, of Cauchy's loss
 constexpr double kLostCost = 20;  // of an observation that a step brings behind its camera
-// The covariance is that of the noise times this: rolling shutter, the rest of the lens, and errors
-// that the views of a point share do not average out. Chosen on seq_tsukuba, seq_corridor,
-// seq_tum_fr1_rpy and three rendered flights (docs/algorithms/focal_length.md).
+// The covariance is that of the noise times this: what else bends a lens, and errors that the views
+// of a point share, do not average out. Chosen, with less of the lens free, on seq_tsukuba,
+// seq_corridor, seq_tum_fr1_rpy and three rendered flights (docs/algorithms/focal_length.md).
 constexpr double kSharedErrors = 20;
 
 struct View {
   cv::Matx33d R;  // cam_from_world
   Vec3 t;
+  // How a point at rest turns and moves in the camera's frame from one frame to the next.
+  Vec3 turn, move;
 };
 struct Seen {
   int view;
   Vec2 pixel;        // from the middle of the picture
+  double row;        // from the middle, over the picture's height
   double precision;  // 1 / sigma
 };
 struct Point {
@@ -52,28 +64,62 @@ cv::Matx33d exp_of(const Vec3& w) {
   return cv::Matx33d::eye() + a * W + b * (W * W);
 }
 
-// A lens with its logarithm of the focal length: the two parameters.
-using Lens = std::array<double, 2>;
-
-// The image of a point in the camera's frame, in pixels from the middle, and its slopes by the
-// point and by the lens. False where the point has no image.
-bool project(const Lens& lens, const Vec3& x, Vec2* pixel, Matx23* by_point, cv::Matx22d* by_lens) {
-  constexpr double kLeastDepth = 1e-6;
-  if (!(x(2) > kLeastDepth)) return false;
-  const double f = std::exp(lens[0]), inverse = 1 / x(2);
-  const Vec2 slope(x(0) * inverse, x(1) * inverse);
-  const double r_sq = slope(0) * slope(0) + slope(1) * slope(1);
-  const double inside = 1 - 4 * lens[1] * r_sq;
+// The distance from the middle at the slope `rho`, over the focal length, and its slope by rho, k1
+// and k2. False where the lens shows no such ray.
+bool bend(double rho, const Lens& lens, double* d, double slopes[3]) {
+  constexpr int kMostSteps = 20;
+  const double k1 = lens(kK1), k2 = lens(kK2);
+  const double inside = 1 - 4 * k1 * rho * rho;
   if (!(inside > 0.01)) return false;
-  const double root = std::sqrt(inside), s = 2 / (1 + root);
-  *pixel = f * s * slope;
+  double at = 2 * rho / (1 + std::sqrt(inside));
+  for (int step = 0; step < kMostSteps; ++step) {
+    const double sq = at * at, bent = 1 + k1 * sq + k2 * sq * sq;
+    const double falls = 1 - k1 * sq - 3 * k2 * sq * sq;  // bent^2 times the slope of at / bent
+    if (!(bent > 0.05) || !(falls > 0.05)) return false;
+    const double error = at - rho * bent;
+    slopes[0] = bent * bent / falls;
+    slopes[1] = at * sq / falls;
+    slopes[2] = slopes[1] * sq;
+    *d = at;
+    if (k2 == 0 || std::fabs(error) < 1e-9) return true;
+    at -= error * bent / falls;
+  }
+  return false;
+}
+
+// The image of a point of the camera's frame, in pixels from the middle, as the row `row` meets it,
+// and its slopes by the point and by the lens. False where the point has no image.
+bool project(const Lens& lens, const View& view, const Vec3& in_camera, double row, Vec2* pixel,
+             Matx23* by_point, Matx2L* by_lens) {
+  constexpr double kLeastDepth = 1e-6;
+  const double late = row * lens(kReadout);
+  const Vec3 moving = cross_matrix(view.turn) * in_camera + view.move;
+  const Vec3 x = in_camera + late * moving;
+  if (!(x(2) > kLeastDepth)) return false;
+  const double f = std::exp(lens(kFocal)), inverse = 1 / x(2);
+  const Vec2 slope(x(0) * inverse, x(1) * inverse);
+  const double rho = cv::norm(slope);
+  double d, slopes[3];
+  if (!bend(rho, lens, &d, slopes)) return false;
+  const bool is_middle = rho < 1e-9;
+  const double s = is_middle ? 1 : d / rho;
+  *pixel = f * (s * slope + Vec2(lens(kCx), lens(kCy)));
   if (!by_point) return true;
-  const double bend = lens[1] * s * s / root;  // ds / d(r^2)
-  const cv::Matx22d by_slope = f * (s * cv::Matx22d::eye() + 2 * bend * (slope * slope.t()));
-  const Matx23 by_x(inverse, 0, -slope(0) * inverse, 0, inverse, -slope(1) * inverse);
-  *by_point = by_slope * by_x;
-  const Vec2 by_k = f * r_sq * s * s / root * slope;
-  *by_lens = {(*pixel)(0), by_k(0), (*pixel)(1), by_k(1)};
+  const Vec2 away = is_middle ? Vec2(0, 0) : (1 / rho) * slope;
+  const cv::Matx22d by_slope =
+      f * (s * cv::Matx22d::eye() + (is_middle ? 0 : slopes[0] - s) * (away * away.t()));
+  const Matx23 by_x =
+      by_slope * Matx23(inverse, 0, -slope(0) * inverse, 0, inverse, -slope(1) * inverse);
+  const Vec2 by_readout = by_x * (row * moving);
+  *by_point = by_x + late * (by_x * cross_matrix(view.turn));
+  for (int r = 0; r < 2; ++r) {
+    (*by_lens)(r, kFocal) = (*pixel)(r);
+    (*by_lens)(r, kK1) = f * slopes[1] * away(r);
+    (*by_lens)(r, kK2) = f * slopes[2] * away(r);
+    (*by_lens)(r, kCx) = r == 0 ? f : 0;
+    (*by_lens)(r, kCy) = r == 1 ? f : 0;
+    (*by_lens)(r, kReadout) = by_readout(r);
+  }
   return true;
 }
 
@@ -127,16 +173,16 @@ class Window {
     system_ = DenseSystem(size);
     gradient_.assign(size, 0);
     for (auto& column : with_lens_) column.assign(size, 0);
-    information = cv::Matx22d::zeros();
-    score = Vec2::zeros();
+    information = LensMatrix::zeros();
+    score = Lens::zeros();
     weight = weighted_sq = 0;
     eliminated_.assign(points.size(), {});
     for (size_t p = 0; p < points.size(); ++p) add_point(lens, damping, p);
     hold_scale();
     for (size_t k = 0; k < size; ++k) system_.at(k, k) = system_.at(k, k) * (1 + damping) + 1e-9;
     if (!system_.factor()) {
-      information = cv::Matx22d::zeros();
-      score = Vec2::zeros();
+      information = LensMatrix::zeros();
+      score = Lens::zeros();
       std::fill(gradient_.begin(), gradient_.end(), 0.0);
       for (auto& column : with_lens_) std::fill(column.begin(), column.end(), 0.0);
       for (size_t k = 0; k < size; ++k) system_.at(k, k) = 1;
@@ -144,21 +190,24 @@ class Window {
     }
     system_.forward(gradient_);
     for (auto& column : with_lens_) system_.forward(column);
-    for (int r = 0; r < 2; ++r)
+    for (int r = 0; r < kParameters; ++r)
       for (size_t k = 0; k < size; ++k) {
         const double entry = with_lens_[static_cast<size_t>(r)][k];
         score(r) -= entry * gradient_[k];
-        for (int c = 0; c < 2; ++c)
+        for (int c = 0; c < kParameters; ++c)
           information(r, c) -= entry * with_lens_[static_cast<size_t>(c)][k];
       }
   }
 
   // The views and points after the step that belongs to a step of the lens. After reduce.
-  void step(const Vec2& of_lens, const Lens& next, std::vector<View>* new_views,
+  void step(const Lens& of_lens, const Lens& next, std::vector<View>* new_views,
             std::vector<Point>* new_points) {
     std::vector<double> v(gradient_.size());
-    for (size_t k = 0; k < v.size(); ++k)
-      v[k] = -gradient_[k] - with_lens_[0][k] * of_lens(0) - with_lens_[1][k] * of_lens(1);
+    for (size_t k = 0; k < v.size(); ++k) {
+      v[k] = -gradient_[k];
+      for (int q = 0; q < kParameters; ++q)
+        v[k] -= with_lens_[static_cast<size_t>(q)][k] * of_lens(q);
+    }
     system_.backward(v);
     *new_views = views;
     *new_points = points;
@@ -200,7 +249,8 @@ class Window {
     Vec2 pixel;
     for (const Seen& seen : point.seen) {
       const View& view = views[static_cast<size_t>(seen.view)];
-      if (!project(lens, view.R * point.position + view.t, &pixel, nullptr, nullptr)) {
+      if (!project(lens, view, view.R * point.position + view.t, seen.row, &pixel, nullptr,
+                   nullptr)) {
         sum += kLostCost;
         continue;
       }
@@ -216,8 +266,8 @@ class Window {
     return sum;
   }
 
-  cv::Matx22d information;
-  Vec2 score;
+  LensMatrix information;
+  Lens score;
   double weight = 0, weighted_sq = 0;  // of the residuals along an axis
 
  private:
@@ -228,10 +278,11 @@ class Window {
     Vec3 g = Vec3::zeros();
     Vec2 pixel;
     Matx23 by_x;
-    cv::Matx22d by_lens;
+    Matx2L by_lens;
     for (const Seen& seen : point.seen) {
       const View& view = views[static_cast<size_t>(seen.view)];
-      if (!project(lens, view.R * point.position + view.t, &pixel, &by_x, &by_lens)) continue;
+      if (!project(lens, view, view.R * point.position + view.t, seen.row, &pixel, &by_x, &by_lens))
+        continue;
       const Vec2 r = seen.precision * (pixel - seen.pixel);
       const double w = seen.precision / (1 + r.dot(r) / (kLossScale * kLossScale));
       const Matx23 slopes = by_x * view.R;
@@ -244,7 +295,7 @@ class Window {
   struct Eliminated {
     cv::Matx33d inverse = cv::Matx33d::zeros();
     Vec3 gradient = Vec3::zeros();
-    Matx23 with_lens = Matx23::zeros();
+    MatxL3 with_lens = MatxL3::zeros();
     std::vector<std::pair<int, Matx63>> with_view;
   };
 
@@ -254,11 +305,11 @@ class Window {
     cv::Matx33d V = cv::Matx33d::zeros();
     Vec2 pixel;
     Matx23 by_x;
-    cv::Matx22d by_lens;
+    Matx2L by_lens;
     for (const Seen& seen : point.seen) {
       const View& view = views[static_cast<size_t>(seen.view)];
       const Vec3 x = view.R * point.position + view.t;
-      if (!project(lens, x, &pixel, &by_x, &by_lens)) continue;
+      if (!project(lens, view, x, seen.row, &pixel, &by_x, &by_lens)) continue;
       const Vec2 r = seen.precision * (pixel - seen.pixel);
       const double w = 1 / (1 + r.dot(r) / (kLossScale * kLossScale));
       const double w_slopes = w * seen.precision * seen.precision, w_r = w * seen.precision;
@@ -284,7 +335,7 @@ class Window {
     }
     for (int k = 0; k < 3; ++k) V(k, k) = V(k, k) * (1 + damping) + 1e-12;
     e.inverse = V.inv(cv::DECOMP_CHOLESKY);
-    const Matx23 lens_inverse = e.with_lens * e.inverse;
+    const MatxL3 lens_inverse = e.with_lens * e.inverse;
     information -= lens_inverse * e.with_lens.t();
     score -= lens_inverse * e.gradient;
     for (const auto& [i, Wi] : e.with_view) {
@@ -292,10 +343,10 @@ class Window {
       const size_t row = 6 * static_cast<size_t>(i - 1);
       const Matx63 inverse = Wi * e.inverse;
       const Vec6 of_gradient = inverse * e.gradient;
-      const Matx62 of_lens = inverse * e.with_lens.t();
+      const Matx6L of_lens = inverse * e.with_lens.t();
       for (size_t k = 0; k < 6; ++k) {
         gradient_[row + k] -= of_gradient(static_cast<int>(k));
-        for (size_t q = 0; q < 2; ++q)
+        for (size_t q = 0; q < kParameters; ++q)
           with_lens_[q][row + k] -= of_lens(static_cast<int>(k), static_cast<int>(q));
       }
       for (const auto& [j, Wj] : e.with_view) {
@@ -328,15 +379,15 @@ class Window {
             largest * away(static_cast<int>(r)) * away(static_cast<int>(c)) / size_sq;
   }
 
-  void add_view(int view, double w_slopes, double w_r, const Matx26& by_pose,
-                const cv::Matx22d& by_lens, const Vec2& r) {
+  void add_view(int view, double w_slopes, double w_r, const Matx26& by_pose, const Matx2L& by_lens,
+                const Vec2& r) {
     const size_t first = 6 * static_cast<size_t>(view - 1);
     const Matx66 block = w_slopes * (by_pose.t() * by_pose);
     const Vec6 right = w_r * (by_pose.t() * r);
-    const Matx62 with = w_slopes * (by_pose.t() * by_lens);
+    const Matx6L with = w_slopes * (by_pose.t() * by_lens);
     for (size_t k = 0; k < 6; ++k) {
       gradient_[first + k] += right(static_cast<int>(k));
-      for (size_t q = 0; q < 2; ++q)
+      for (size_t q = 0; q < kParameters; ++q)
         with_lens_[q][first + k] += with(static_cast<int>(k), static_cast<int>(q));
       for (size_t c = 0; c < 6; ++c)
         system_.at(first + k, first + c) += block(static_cast<int>(k), static_cast<int>(c));
@@ -345,24 +396,27 @@ class Window {
 
   DenseSystem system_{0};
   std::vector<double> gradient_;
-  std::array<std::vector<double>, 2> with_lens_;
+  std::array<std::vector<double>, kParameters> with_lens_;
   std::vector<Eliminated> eliminated_;
 };
 
-Window window_of(const std::vector<const FlightKeyframe*>& keyframes,
+Window window_of(const std::vector<const LensKeyframe*>& keyframes,
                  const std::vector<tv_map_point>& points, int width, int height) {
   Window window;
   std::map<int32_t, Point> by_index;
-  for (const FlightKeyframe* key : keyframes) {
+  for (const LensKeyframe* given : keyframes) {
+    const FlightKeyframe* const key = given->key;
     const auto view = static_cast<int>(window.views.size());
     const cv::Matx33d R = cv::Matx33d(key->keyframe.world_from_cam_R).t();
-    window.views.push_back({R, -1 * (R * Vec3(key->keyframe.world_from_cam_t))});
+    window.views.push_back({R, -1 * (R * Vec3(key->keyframe.world_from_cam_t)),
+                            Vec3(given->turn.data()), Vec3(given->move.data())});
     for (const tv_map_observation& o : key->observations) {
       Point& point = by_index[o.idx_point];
       point.position = Vec3(points[static_cast<size_t>(o.idx_point)].position);
+      const double y = static_cast<double>(o.y) - (height - 1) / 2.0;
       point.seen.push_back({view,
-                            {static_cast<double>(o.x) - (width - 1) / 2.0,
-                             static_cast<double>(o.y) - (height - 1) / 2.0},
+                            {static_cast<double>(o.x) - (width - 1) / 2.0, y},
+                            y / height,
                             1.0 / std::max(static_cast<double>(o.sigma), 0.01)});
     }
   }
@@ -372,11 +426,11 @@ Window window_of(const std::vector<const FlightKeyframe*>& keyframes,
 }
 
 // Windows of nearly equal length, spread over the map.
-std::vector<Window> windows_of(const std::vector<FlightKeyframe>& keyframes,
+std::vector<Window> windows_of(const std::vector<LensKeyframe>& keyframes,
                                const std::vector<tv_map_point>& points, int width, int height) {
-  std::map<int32_t, std::vector<const FlightKeyframe*>> segments;
-  for (const FlightKeyframe& key : keyframes) segments[key.keyframe.segment].push_back(&key);
-  std::vector<std::vector<const FlightKeyframe*>> parts;
+  std::map<int32_t, std::vector<const LensKeyframe*>> segments;
+  for (const LensKeyframe& key : keyframes) segments[key.key->keyframe.segment].push_back(&key);
+  std::vector<std::vector<const LensKeyframe*>> parts;
   for (const auto& [segment, keys] : segments) {
     const size_t count = (keys.size() + kWindow - 1) / kWindow;
     for (size_t k = 0; k < count; ++k) {
@@ -392,34 +446,40 @@ std::vector<Window> windows_of(const std::vector<FlightKeyframe>& keyframes,
   return windows;
 }
 
+// The standard deviations of what is believed before the film is seen.
+Lens prior_sigmas(int width, int height, double focal_px) {
+  // The principal points of calibrated cameras are up to some per cent of the picture's diagonal
+  // away from its middle. A rolling shutter takes up to the whole time between two frames.
+  constexpr double kPriorCentre = 0.02, kPriorReadout = 0.5;
+  const double centre = kPriorCentre * std::hypot(width, height) / focal_px;
+  return {kPriorLogFocal, kPriorK1, kPriorK2, centre, centre, kPriorReadout};
+}
+
 // Levenberg-Marquardt over the windows and the lens that they share.
 class Adjustment {
  public:
-  Adjustment(std::vector<Window> windows, const SimpleLens& start, double prior_log_focal)
-      : windows_(std::move(windows)),
-        lens_{std::log(start.focal_px), start.k1},
-        prior_(prior_log_focal) {}
+  Adjustment(std::vector<Window> windows, const Lens& start, const Lens& prior,
+             const Lens& prior_sigma)
+      : windows_(std::move(windows)), lens_(start), prior_(prior), prior_sigma_(prior_sigma) {}
 
   const Lens& lens() const { return lens_; }
   double cost() const { return cost_; }
   double noise_sq() const { return noise_sq_; }
-  void move_focal_length(double log_step) { lens_[0] += log_step; }
 
-  // is_free: the focal length and k1; the others stay as they are.
-  void minimise(std::array<bool, 2> is_free, int most_steps) {
+  void minimise(int most_steps) {
     constexpr double kSmallMove = 2e-4, kUndamped = 1e-4, kMostDamping = 1e3, kLeastDamping = 1e-8;
-    const Vec2 longest(0.2, 0.1);
+    const Lens longest(0.2, 0.1, 0.1, 0.05, 0.05, 0.3);
     double damping = 1e-4, growth = 2;
     bool is_fresh = false;
     for (int step = 0; step < most_steps && !windows_.empty(); ++step) {
-      linearise(damping, is_free);
+      linearise(damping);
       if (!is_fresh) measure_cost();  // under the prior of the noise as it is now
       is_fresh = true;
-      cv::Matx22d damped = information_;
-      for (int k = 0; k < 2; ++k) damped(k, k) *= 1 + damping;
-      Vec2 move = -1 * (damped.inv() * score_);
-      for (int k = 0; k < 2; ++k) move(k) = std::clamp(move(k), -longest(k), longest(k));
-      const Lens next = {lens_[0] + move(0), lens_[1] + move(1)};
+      LensMatrix damped = information_;
+      for (int k = 0; k < kParameters; ++k) damped(k, k) *= 1 + damping;
+      Lens move = -1 * (damped.inv() * score_);
+      for (int k = 0; k < kParameters; ++k) move(k) = std::clamp(move(k), -longest(k), longest(k));
+      const Lens next = lens_ + move;
       double next_cost = cost_of_prior(next);
       std::vector<std::vector<View>> views(windows_.size());
       std::vector<std::vector<Point>> points(windows_.size());
@@ -441,29 +501,33 @@ class Adjustment {
         windows_[n].views.swap(views[n]);
         windows_[n].points.swap(points[n]);
       }
-      const bool is_small = std::fabs(move(0)) < kSmallMove && std::fabs(move(1)) < kSmallMove;
-      const bool holds_focal = !is_free[0] && gain < noise_sq_;
-      if (damping < kUndamped && is_small && (is_free[0] || holds_focal)) return;
+      const bool is_settled = holds_focal_ ? gain < noise_sq_ : true;
+      if (damping < kUndamped && cv::norm(move, cv::NORM_INF) < kSmallMove && is_settled) return;
       damping = std::max(damping / 3, kLeastDamping);
       growth = 2;
     }
   }
 
-  // The covariance of the two parameters: that of the noise, and how much the windows contradict
-  // each other.
-  cv::Matx22d covariance(std::array<bool, 2> is_free) {
+  // The variance of the log of the focal length: that of the noise, and how much the windows
+  // contradict each other.
+  double focal_variance() {
     constexpr double kToInvert = 1e-6;
-    linearise(kToInvert, is_free);
+    linearise(kToInvert);
     measure_cost();
-    const cv::Matx22d inverse = information_.inv();
-    cv::Matx22d spread = cv::Matx22d::zeros();
-    for (const Window& window : windows_) {
-      Vec2 s = window.score;
-      for (int k = 0; k < 2; ++k)
-        if (!is_free[static_cast<size_t>(k)]) s(k) = 0;
-      spread += s * s.t();
-    }
-    return kSharedErrors * noise_sq_ * inverse + inverse * spread * inverse;
+    const LensMatrix inverse = information_.inv();
+    LensMatrix spread = LensMatrix::zeros();
+    for (const Window& window : windows_) spread += window.score * window.score.t();
+    return kSharedErrors * noise_sq_ * inverse(kFocal, kFocal) +
+           LensMatrix(inverse * spread * inverse)(kFocal, kFocal);
+  }
+
+  // The cost with the focal length held this far away and all else adjusted again.
+  double cost_away(double log_step, int most_steps) const {
+    Adjustment other = *this;
+    other.lens_(kFocal) += log_step;
+    other.holds_focal_ = true;
+    other.minimise(most_steps);
+    return other.cost_;
   }
 
  private:
@@ -471,18 +535,19 @@ class Adjustment {
     cost_ = cost_of_prior(lens_);
     for (const Window& window : windows_) cost_ += window.cost(lens_);
   }
-  Vec2 prior_weights() const {
-    const double weight = kSharedErrors * noise_sq_;
-    return {weight / (kPriorLogFocal * kPriorLogFocal), weight / (kPriorK1 * kPriorK1)};
+  double prior_weight(int k) const {
+    return kSharedErrors * noise_sq_ / (prior_sigma_(k) * prior_sigma_(k));
   }
   double cost_of_prior(const Lens& at) const {
-    const double d = at[0] - prior_;
-    return prior_weights()(0) * d * d + prior_weights()(1) * at[1] * at[1];
+    double sum = 0;
+    for (int k = 0; k < kParameters; ++k)
+      sum += prior_weight(k) * (at(k) - prior_(k)) * (at(k) - prior_(k));
+    return sum;
   }
 
-  void linearise(double damping, std::array<bool, 2> is_free) {
-    information_ = cv::Matx22d::zeros();
-    score_ = Vec2::zeros();
+  void linearise(double damping) {
+    information_ = LensMatrix::zeros();
+    score_ = Lens::zeros();
     double weight = 0, sum = 0;
     for (Window& window : windows_) {
       window.reduce(lens_, damping);
@@ -493,73 +558,62 @@ class Adjustment {
     }
     constexpr double kLeastNoiseSq = 1e-4;
     if (weight > 0) noise_sq_ = std::max(sum / weight, kLeastNoiseSq);
-    const Vec2 w = prior_weights();
-    score_ += Vec2(w(0) * (lens_[0] - prior_), w(1) * lens_[1]);
-    for (int k = 0; k < 2; ++k) information_(k, k) += w(k);
-    for (int k = 0; k < 2; ++k) {
-      if (is_free[static_cast<size_t>(k)]) continue;
-      information_(0, 1) = information_(1, 0) = 0;
-      information_(k, k) = 1;
-      score_(k) = 0;
+    for (int k = 0; k < kParameters; ++k) {
+      score_(k) += prior_weight(k) * (lens_(k) - prior_(k));
+      information_(k, k) += prior_weight(k);
     }
+    if (!holds_focal_) return;
+    for (int k = 0; k < kParameters; ++k) information_(kFocal, k) = information_(k, kFocal) = 0;
+    information_(kFocal, kFocal) = 1;
+    score_(kFocal) = 0;
   }
 
   std::vector<Window> windows_;
-  Lens lens_;
-  double prior_;
-  cv::Matx22d information_ = cv::Matx22d::eye();
-  Vec2 score_ = Vec2::zeros();
+  Lens lens_, prior_, prior_sigma_;
+  bool holds_focal_ = false;
+  LensMatrix information_ = LensMatrix::eye();
+  Lens score_ = Lens::zeros();
   double noise_sq_ = 1, cost_ = 0;
 };
 
 // The variance of the log of the focal length by what it costs to hold another one. Where a camera
 // moves without turning, the slopes at the optimum are of noise and promise more than is known.
-double variance_by_cost(const Adjustment& best, bool frees_k1) {
+double variance_by_cost(const Adjustment& best) {
   constexpr double kAway = 0.1;
   constexpr int kSteps = 20;
-  double least = -1;
-  for (const double step : {-kAway, kAway}) {
-    Adjustment other = best;
-    other.move_focal_length(step);
-    other.minimise({false, frees_k1}, kSteps);
-    const double more = other.cost() - best.cost();
-    least = least < 0 ? std::max(more, 0.0) : std::min(least, std::max(more, 0.0));
-  }
-  const double chi2 = least / (kSharedErrors * best.noise_sq());
+  const double least =
+      std::min(best.cost_away(-kAway, kSteps), best.cost_away(kAway, kSteps)) - best.cost();
+  const double chi2 = std::max(least, 0.0) / (kSharedErrors * best.noise_sq());
   constexpr double kPriorVariance = kPriorLogFocal * kPriorLogFocal;
   return 1 / (chi2 / (kAway * kAway) + 1 / kPriorVariance);
 }
 
 }  // namespace
 
-LensEstimate adjust_lens(const std::vector<FlightKeyframe>& keyframes,
+LensEstimate adjust_lens(const std::vector<LensKeyframe>& keyframes,
                          const std::vector<tv_map_point>& points, int width, int height,
                          const SimpleLens& start) {
   constexpr int kMostSteps = 50;
   constexpr size_t kLeastKeyframes = 8;  // three views and one turn fit any lens
-  // Standard deviations of k1 from 0. At 3 a rolling shutter (seq_tum_fr1_rpy) passes for a lens.
-  constexpr double kSignificant = 5;
+  constexpr double kPriorVariance = kPriorLogFocal * kPriorLogFocal;
   LensEstimate estimate;
   estimate.lens = start;
-  estimate.focal_variance = kPriorLogFocal * kPriorLogFocal;
-  const std::vector<Window> windows = windows_of(keyframes, points, width, height);
+  estimate.focal_variance = kPriorVariance;
+  std::vector<Window> windows = windows_of(keyframes, points, width, height);
   size_t num_views = 0;
   for (const Window& window : windows) num_views += window.views.size();
   if (num_views < kLeastKeyframes) return estimate;
-  const double prior = std::log(focal_px_of(kPriorFocal35mm, width, height));
-  for (const bool frees_k1 : {true, false}) {
-    const SimpleLens from{start.focal_px, frees_k1 ? start.k1 : 0};
-    Adjustment adjustment(windows, from, prior);
-    adjustment.minimise({true, frees_k1}, kMostSteps);
-    const cv::Matx22d V = adjustment.covariance({true, frees_k1});
-    const double k1 = adjustment.lens()[1];
-    if (frees_k1 && !(k1 * k1 > kSignificant * kSignificant * V(1, 1))) continue;
-    estimate.lens = {std::exp(adjustment.lens()[0]), k1};
-    const double by_cost = variance_by_cost(adjustment, frees_k1);
-    estimate.focal_variance =
-        V(0, 0) < estimate.focal_variance ? std::max(V(0, 0), by_cost) : estimate.focal_variance;
-    break;
-  }
+  const double prior_px = focal_px_of(kPriorFocal35mm, width, height), f = start.focal_px;
+  Adjustment adjustment(std::move(windows),
+                        {std::log(f), start.k1, start.k2, start.cx / f, start.cy / f, 0},
+                        {std::log(prior_px), 0, 0, 0, 0, 0}, prior_sigmas(width, height, prior_px));
+  adjustment.minimise(kMostSteps);
+  const double variance = adjustment.focal_variance();
+  const Lens& lens = adjustment.lens();
+  const double focal_px = std::exp(lens(kFocal));
+  estimate.lens = {focal_px, lens(kK1), lens(kK2), focal_px * lens(kCx), focal_px * lens(kCy)};
+  if (variance < kPriorVariance)
+    estimate.focal_variance = std::max(variance, variance_by_cost(adjustment));
   estimate.is_known = true;
   return estimate;
 }

@@ -1,18 +1,23 @@
-// A lens of one coefficient, for a camera of which nothing is known.
+// A lens of few numbers, for a camera of which nothing is known.
 #pragma once
 
 #include "twoview/camera.h"
 
 namespace cli {
 
-// Square pixels, and the principal point in the middle of the picture. With d the pixel's distance
-// from the middle over the focal length, the slope of its ray is d / (1 + k1 d^2): the division
-// model, whose coefficient is the first one of Brown-Conrady.
-// A. Fitzgibbon, "Simultaneous linear estimation of multiple view geometry and lens distortion",
-// CVPR 2001.
+// Square pixels. With d the pixel's distance from the principal point over the focal length, the
+// slope of its ray is d / (1 + k1 d^2 + k2 d^4): the division model, whose first coefficient is
+// that of Brown-Conrady. A. Fitzgibbon, "Simultaneous linear estimation of multiple view geometry
+// and lens distortion", CVPR 2001.
 struct SimpleLens {
   double focal_px = 0;
-  double k1 = 0;
+  double k1 = 0, k2 = 0;
+  double cx = 0, cy = 0;  // the principal point, in pixels from the middle of the picture
+
+  // The lens of the same camera whose pictures are `factor` times as wide and as high.
+  SimpleLens scaled(double factor) const {
+    return {factor * focal_px, k1, k2, factor * cx, factor * cy};
+  }
 };
 
 // The lens as a camera of the library: a pinhole, or Brown-Conrady's three radial coefficients that
@@ -24,8 +29,9 @@ double focal_35mm_of(double focal_px, int width, int height);
 double focal_px_of(double focal_35mm, int width, int height);
 
 // What is believed of a camera before its film is seen: the focal length as for 35 mm film, and the
-// standard deviations of its logarithm and of k1.
-inline constexpr double kPriorFocal35mm = 27, kPriorLogFocal = 0.5, kPriorK1 = 0.15;
+// standard deviations of its logarithm and of both coefficients.
+inline constexpr double kPriorFocal35mm = 27, kPriorLogFocal = 0.5, kPriorK1 = 0.15,
+                        kPriorK2 = 0.15;
 
 // Above this relative standard deviation an estimated focal length is doubtful.
 inline constexpr double kMostFocalSigma = 0.05;
