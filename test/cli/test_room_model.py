@@ -242,6 +242,10 @@ class RoomTest(CliTest):
         self.assertEqual((room["share_inferred"], room["truth"]), (0, None))
         self.assertAlmostEqual(sum(room["pixels"].values()), 1, 6)
         self.assertGreater(room["pixels"]["measured"], 0.3)
+        towards = room["pixels_towards"]  # the camera looks one way all the time
+        self.assertAlmostEqual(sum(one["of_all_pixels"] for one in towards.values()), 1, 6)
+        self.assertGreater(max(one["of_all_pixels"] for one in towards.values()), 0.9)
+        self.assertIn("hardly looked at", (self.out / "report.html").read_text())
         self.assertEqual(len(os.listdir(self.out / "depth")), room["keyframes_used"])
         self.assertGreater(room["depth_maps"]["grey_levels_per_unit"], 0)
         # A run without them removes them.

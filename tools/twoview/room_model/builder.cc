@@ -143,10 +143,11 @@ void RoomBuilder::run(const Job& job) {
   const double before = cpu_ms();
   if (views.size() < 2) {
     ++num_without_;
-    sweep_.count_unmapped(*pictures[0], counts_);
+    sweep_.count_unmapped(*pictures[0], counts_[job.key]);
     return;
   }
-  maps_.push_back({job.key, sweep_.run(views, pictures, job.range.near, job.range.far, counts_)});
+  maps_.push_back(
+      {job.key, sweep_.run(views, pictures, job.range.near, job.range.far, counts_[job.key])});
   const double swept = cpu_ms();
   fuse(maps_.back());
   ms_depth_ += swept - before;
@@ -269,6 +270,23 @@ void RoomBuilder::add_depth_maps(RoomModel& model) {
   }
 }
 
+void RoomBuilder::count_pixels(RoomModel& model) const {
+  for (const auto& [view, tiles] : counts_) {
+    for (int row = 0, k = 0; row < kTileRows; ++row) {
+      for (int column = 0; column < kTileColumns; ++column, ++k) {
+        const Vector3 ray =
+            applied(model.axes, applied(scene_.views[view].R, sweep_.ray_of_tile(column, row)));
+        size_t axis = 0;
+        for (size_t other = 1; other < 3; ++other)
+          if (std::abs(ray[other]) > std::abs(ray[axis])) axis = other;
+        const PixelCounts& counts = tiles[static_cast<size_t>(k)];
+        model.pixels.add(counts);
+        model.pixels_towards[2 * axis + (ray[axis] < 0)].add(counts);
+      }
+    }
+  }
+}
+
 void RoomBuilder::add_free_area(RoomModel& model) {
   constexpr int kStep = 4;  // pixels between rays
   const tv_camera& camera = sweep_.map_camera();
@@ -327,7 +345,7 @@ RoomModel RoomBuilder::finish() {
   model.ms_fusion = ms_fusion_ / num;
   model.memory_bytes = static_cast<size_t>(settings_.max_memory_mib) << 20;
   model.median_depth = median_depth_;
-  model.pixels = counts_;
+  count_pixels(model);
   model.map_camera = sweep_.map_camera();
   if (settings_.keeps_depth_maps) add_depth_maps(model);
   add_page_mesh(model);

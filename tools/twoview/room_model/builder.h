@@ -54,6 +54,7 @@ class RoomBuilder {
   RoomMesh mesh() const;
   void add_page_mesh(RoomModel& model);
   void add_depth_maps(RoomModel& model);
+  void count_pixels(RoomModel& model) const;
   void add_free_area(RoomModel& model);
 
   cv::Size picture_size_;
@@ -70,7 +71,7 @@ class RoomBuilder {
   std::vector<Map> maps_;
   std::vector<float> distance_, sigma_;  // of the map that is in work
   std::vector<uint8_t> rgb_;
-  PixelCounts counts_;
+  std::map<size_t, TileCounts> counts_;  // by view
   int num_without_ = 0, num_missing_ = 0;
   double ms_depth_ = 0, ms_fusion_ = 0;
 };

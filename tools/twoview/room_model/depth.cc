@@ -110,7 +110,7 @@ void DepthSweep::bring_to_map(const cv::Mat& picture, cv::Mat& out, int interpol
 
 KnownPixels DepthSweep::run(const std::vector<const RoomView*>& views,
                             const std::vector<const RoomPicture*>& pictures, double near_depth,
-                            double far_depth, PixelCounts& counts) {
+                            double far_depth, TileCounts& tiles) {
   std::vector<tv_depth_view> swept(views.size());
   for (size_t k = 0; k < views.size(); ++k) {
     swept[k].image = view_of(pictures[k]->luma);
@@ -132,6 +132,7 @@ KnownPixels DepthSweep::run(const std::vector<const RoomView*>& views,
   if (!picture.mask.empty()) bring_to_map(picture.mask, mask, cv::INTER_NEAREST);
   const cv::Mat textured = texture_of(cv::Mat(size, CV_8U, grey_.data()));
   for (size_t i = 0; i < distance_.size(); ++i) {
+    PixelCounts& counts = tiles[tile_of(i)];
     if (!mask.empty() && mask.data[i] == 0) {
       distance_[i] = 0;
     } else if (witnesses_[i] >= kFewestWitnesses && distance_[i] > 0) {
@@ -146,12 +147,27 @@ KnownPixels DepthSweep::run(const std::vector<const RoomView*>& views,
   return KnownPixels(distance_, sigma_, rgb_);
 }
 
-void DepthSweep::count_unmapped(const RoomPicture& picture, PixelCounts& counts) {
+void DepthSweep::count_unmapped(const RoomPicture& picture, TileCounts& tiles) {
   cv::Mat grey;
   bring_to_map(picture.luma, grey, cv::INTER_LINEAR);
-  const int plain = static_cast<int>(grey.total()) - cv::countNonZero(texture_of(grey));
-  counts.no_texture += plain;
-  counts.one_place += static_cast<int64_t>(grey.total()) - plain;
+  const cv::Mat textured = texture_of(grey);
+  for (size_t i = 0; i < grey.total(); ++i) {
+    PixelCounts& counts = tiles[tile_of(i)];
+    ++(textured.data[i] == 0 ? counts.no_texture : counts.one_place);
+  }
+}
+
+size_t DepthSweep::tile_of(size_t pixel) const {
+  const size_t width = static_cast<size_t>(map_camera_.width);
+  const size_t height = static_cast<size_t>(map_camera_.height);
+  const size_t column = pixel % width * kTileColumns / width;
+  return pixel / width * kTileRows / height * kTileColumns + column;
+}
+
+Vector3 DepthSweep::ray_of_tile(int column, int row) const {
+  const double x = (column + 0.5) * map_camera_.width / kTileColumns - 0.5;
+  const double y = (row + 0.5) * map_camera_.height / kTileRows - 0.5;
+  return {(x - map_camera_.cx) / map_camera_.fx, (y - map_camera_.cy) / map_camera_.fy, 1};
 }
 
 }  // namespace cli

@@ -1,6 +1,7 @@
 // The depth map of one keyframe, as it is kept until the room is finished.
 #pragma once
 
+#include <array>
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
@@ -34,6 +35,10 @@ class KnownPixels {
   std::vector<uint8_t> rgb_;
 };
 
+// What became of a map's pixels, in tiles of it: row by row.
+constexpr int kTileColumns = 8, kTileRows = 6;
+using TileCounts = std::array<PixelCounts, static_cast<size_t>(kTileColumns* kTileRows)>;
+
 // Sweeps the depth of views; its memory is made once.
 class DepthSweep {
  public:
@@ -46,11 +51,14 @@ class DepthSweep {
   // luma, and there are two at least.
   KnownPixels run(const std::vector<const RoomView*>& views,
                   const std::vector<const RoomPicture*>& pictures, double near_depth,
-                  double far_depth, PixelCounts& counts);
+                  double far_depth, TileCounts& counts);
   // The pixels of the map without texture, for a view that has no map.
-  void count_unmapped(const RoomPicture& picture, PixelCounts& counts);
+  void count_unmapped(const RoomPicture& picture, TileCounts& counts);
+  // The direction in which a tile's middle looks, in the frame of the camera.
+  Vector3 ray_of_tile(int column, int row) const;
 
  private:
+  size_t tile_of(size_t pixel) const;
   void bring_to_map(const cv::Mat& picture, cv::Mat& out, int interpolation) const;
 
   tv_camera camera_, map_camera_;

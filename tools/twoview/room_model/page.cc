@@ -94,20 +94,27 @@ std::string cards(const RoomScene& scene, const RoomModel& model, const RoomPlan
 
 std::string truth_section(const RoomModel& model) {
   if (!model.truth) return "";
-  const auto row = [](const char* name, const TruthScores& s) {
-    const auto cell = [](const std::optional<double>& value, double factor, const char* format) {
+  const TruthScores &placed = model.truth->placed, &registered = model.truth->registered;
+  const auto row = [](const char* name, const std::optional<double>& first,
+                      const std::optional<double>& second, double factor, const char* format) {
+    const auto cell = [&](const std::optional<double>& value) {
       return "<td>" + (value ? formatted(format, factor * *value) : std::string("-")) + "</td>";
     };
-    return "<tr><th>" + std::string(name) + "</th>" + cell(s.precision, 1, "%.3f") +
-           cell(s.precision_measured, 1, "%.3f") + cell(s.precision_inferred, 1, "%.3f") +
-           cell(s.recall, 1, "%.3f") + cell(s.f, 1, "%.3f") +
-           cell(s.accuracy_median, 100, "%.1f cm") + cell(s.completeness_median, 100, "%.1f cm") +
-           "</tr>\n";
+    return "<tr><th>" + std::string(name) + "</th>" + cell(first) + cell(second) + "</tr>\n";
   };
-  return "<h2>Beside the true surface</h2>\n<table>\n<tr><th></th><th>precision at 5 cm</th>"
-         "<th>of what was measured</th><th>of what was inferred</th><th>recall</th><th>F</th>"
-         "<th>median distance to the truth</th><th>from the truth</th></tr>\n" +
-         row("as placed", model.truth->placed) + row("registered", model.truth->registered) +
+  return "<h2>Beside the true surface</h2>\n<table>\n<tr><th></th><td>as placed</td>"
+         "<td>registered</td></tr>\n" +
+         row("F at 5 cm", placed.f, registered.f, 1, "%.3f") +
+         row("precision", placed.precision, registered.precision, 1, "%.3f") +
+         row("of what was measured", placed.precision_measured, registered.precision_measured, 1,
+             "%.3f") +
+         row("of what was inferred", placed.precision_inferred, registered.precision_inferred, 1,
+             "%.3f") +
+         row("recall", placed.recall, registered.recall, 1, "%.3f") +
+         row("median distance to the truth", placed.accuracy_median, registered.accuracy_median,
+             100, "%.1f cm") +
+         row("median distance from the truth", placed.completeness_median,
+             registered.completeness_median, 100, "%.1f cm") +
          "</table>\n<p class=\"hint\">Placed by " + escaped(model.truth->placed_by) +
          ". Registered: after the similarity that fits the surface best. Recall is of what two "
          "keyframes could see.</p>\n";
@@ -116,7 +123,10 @@ std::string truth_section(const RoomModel& model) {
 std::string missing_section(const RoomModel& model) {
   const std::vector<std::string> words = missing_words(model);
   if (words.empty()) return "";
-  return "<h2>Where nothing was measured</h2>\n" + bullets("notes", words);
+  const std::string all = "<h2>Where nothing was measured</h2>\n" + bullets("notes", words);
+  if (model.triangles.empty()) return all;  // without a plan there are no directions
+  return all + "<p>By the direction in which the keyframes' pixels look:</p>\n" +
+         bullets("notes", direction_words(model));
 }
 
 }  // namespace

@@ -35,6 +35,9 @@ double share_inferred(const RoomModel& model) {
   return static_cast<double>(count) / static_cast<double>(model.vertices.size());
 }
 
+const char* const kDirectionKeys[kNumDirections] = {"plan_right",  "plan_left", "plan_top",
+                                                    "plan_bottom", "up",        "down"};
+
 std::string short_unit(const RoomScene& scene) { return scene.is_metric ? " m" : ""; }
 
 }  // namespace
@@ -60,6 +63,13 @@ Json room_json(const RoomScene& scene, const RoomModel& model) {
   json["keyframes_without_depth"] = model.keyframes_without;
   json["pictures_missing"] = model.pictures_missing;
   json["pixels"] = shares_json(model.pixels);
+  for (size_t k = 0; k < kNumDirections; ++k) {
+    const PixelCounts& towards = model.pixels_towards[k];
+    const double all = static_cast<double>(std::max<int64_t>(1, model.pixels.total()));
+    Json& entry = json["pixels_towards"][kDirectionKeys[k]];
+    entry = shares_json(towards);
+    entry["of_all_pixels"] = static_cast<double>(towards.total()) / all;
+  }
   json["ms_per_keyframe"] = {
       {"depth", model.ms_depth}, {"fusion", model.ms_fusion}, {"mesh", model.ms_mesh / num}};
   json["memory_bytes"] = model.memory_bytes;
@@ -136,6 +146,37 @@ std::vector<std::string> missing_words(const RoomModel& model) {
     words.emplace_back(text);
   }
   return words;
+}
+
+std::vector<std::string> direction_words(const RoomModel& model) {
+  constexpr double kHardly = 0.02;  // of all pixels
+  const char* const names[kNumDirections] = {
+      "to the right of the plan",  "to the left of the plan", "to the top of the plan",
+      "to the bottom of the plan", "upwards, to the ceiling", "downwards, to the floor"};
+  std::vector<std::string> sentences;
+  const double all = static_cast<double>(std::max<int64_t>(1, model.pixels.total()));
+  for (size_t k = 0; k < kNumDirections; ++k) {
+    const PixelCounts& p = model.pixels_towards[k];
+    const double total = static_cast<double>(std::max<int64_t>(1, p.total()));
+    char text[240];
+    if (static_cast<double>(p.total()) < kHardly * all) {
+      std::snprintf(text, sizeof text, "%s: hardly looked at (%.1f %% of the pixels)", names[k],
+                    100 * static_cast<double>(p.total()) / all);
+      sentences.emplace_back(text);
+      continue;
+    }
+    const std::pair<int64_t, const char*> causes[] = {
+        {p.no_texture, "a plain area without texture"},
+        {p.one_place, "seen from one place only"},
+        {p.unconfirmed, "seen too seldom, or contradicted"},
+        {p.ambiguous, "too far away, moving, reflecting, or at an edge"}};
+    const auto most = std::max_element(std::begin(causes), std::end(causes));
+    std::snprintf(text, sizeof text, "%s: %.0f %% measured; what is missing is mostly %s (%.0f %%)",
+                  names[k], 100 * static_cast<double>(p.measured) / total, most->second,
+                  100 * static_cast<double>(most->first) / total);
+    sentences.emplace_back(text);
+  }
+  return sentences;
 }
 
 std::string room_summary(const RoomScene& scene, const RoomModel& model) {

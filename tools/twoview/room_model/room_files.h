@@ -28,6 +28,9 @@ double depth_levels(const RoomModel& model);
 
 // Lines of the summary.
 std::string room_summary(const RoomScene& scene, const RoomModel& model);
+// What was measured in each direction of the plan, and why the rest is missing: sentences without
+// an end, in the order of Direction.
+std::vector<std::string> direction_words(const RoomModel& model);
 // Why parts of the room are missing, the most frequent first, as sentences without an end.
 std::vector<std::string> missing_words(const RoomModel& model);
 

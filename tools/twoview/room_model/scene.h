@@ -55,7 +55,19 @@ struct PixelCounts {
   int64_t unconfirmed = 0;  // a distance that fewer than two other pictures confirm
   int64_t ambiguous = 0;    // texture, but no distance: too far, moving, mirrored, or out of view
   int64_t total() const { return measured + no_texture + one_place + unconfirmed + ambiguous; }
+  void add(const PixelCounts& other) {
+    measured += other.measured;
+    no_texture += other.no_texture;
+    one_place += other.one_place;
+    unconfirmed += other.unconfirmed;
+    ambiguous += other.ambiguous;
+  }
 };
+
+// Where the pixels of keyframes look: along the room's axes as its plan shows them, whichever is
+// nearest.
+enum Direction { kPlanRight, kPlanLeft, kPlanTop, kPlanBottom, kUpwards, kDownwards };
+constexpr size_t kNumDirections = 6;
 
 // A depth map as it is written: distance along the optical axis, 0 where it is unknown.
 struct DepthPicture {
@@ -96,6 +108,7 @@ struct RoomModel {
   size_t memory_bytes = 0;             // of the room
   double median_depth = 0;             // of the points that the keyframes see
   PixelCounts pixels;
+  std::array<PixelCounts, kNumDirections> pixels_towards;
   tv_camera map_camera{};                // of the depth maps
   std::vector<DepthPicture> depth_maps;  // where they are kept
   std::optional<RoomTruth> truth;        // beside the true surface, where that is known
