@@ -20,6 +20,9 @@ namespace {
 // The side of a voxel as a share of the median depth: 3 cm at 2.5 m, about three pixels of a depth
 // map.
 constexpr double kVoxelShare = 0.012;
+// Maps are fused so many voxels before and behind their surface: three of their standard
+// deviations, 1.8 % of the depth in the median.
+constexpr int32_t kTruncationVoxels = 5;
 constexpr int32_t kFewestMaps = 2;  // that must have seen a surface, where there are two at all
 
 // CPU time of this thread, in milliseconds: other programs on the machine do not count.
@@ -93,6 +96,7 @@ RoomBuilder::RoomBuilder(RoomScene scene, const RoomSettings& settings)
     for (const size_t view : job.views) ++uses_[view];
   tv_room_options options;
   tv_room_options_init(&options);
+  options.truncation_voxels = kTruncationVoxels;
   if (settings_.voxel > 0)
     options.voxel = settings_.voxel;
   else if (median_depth_ > 0)

@@ -14,6 +14,7 @@ WANTED = ((0.1, 1), (0.1, -1), (0.2, 1), (0.2, -1))
 NEIGHBOURS = 120  # frames before and after a keyframe among which its partners are looked for
 MOST_TURN = 0.35  # radians between the axes of a keyframe and a partner
 LEAST_WITNESSES = 2  # of a depth that is measured
+TRUNCATION_VOXELS = 5  # three standard deviations of a depth, 1.8 % of it in the median
 
 
 @dataclass
@@ -84,7 +85,8 @@ def make(flight, settings=Settings()):
     def pictures(i):
         return cv2.imread(f"{flight.folder}/{flight.names[i]}", cv2.IMREAD_GRAYSCALE)
 
-    room = tv.Room(settings.memory_mib << 20, voxel=settings.voxel)
+    room = tv.Room(settings.memory_mib << 20, voxel=settings.voxel,
+                   truncation_voxels=TRUNCATION_VOXELS)
     keyframes, spent_depth, spent_fusion = [], 0.0, 0.0
 
     def add(pose, *arrays, **keywords):
