@@ -18,8 +18,8 @@ from pathlib import Path
 import numpy as np
 
 from cli_support import CliTest, main, png, program
-from test_odometry import (CAMERAS, COUNT, FOCAL, HEIGHT, LUMA, PICTURES, SHIFTS, TIMES, TUM_TRUTH, WIDTH,
-                           poses)
+from test_odometry import (CAMERAS, COUNT, FOCAL, HEIGHT, LUMA, PICTURES, SHIFTS, TIMES, TUM_TRUTH,
+                           WIDTH, poses)
 
 STEP = 0.1  # units of the truth between two frames
 DEPTHS = [FOCAL * STEP / shift for shift in SHIFTS]  # of the walls
@@ -85,9 +85,12 @@ def read_glb(data):
     return json.loads(data[20:start]), data[start + 8:]
 
 
-# The walls: strips of the picture's height, x from what the first frame shows to what the last does.
-WALLS = [{"z": depth, "x": (-(WIDTH / 2) / FOCAL * depth, WIDTH / 2 / FOCAL * depth + STEP * (COUNT - 1)),
-          "y": tuple((edge * HEIGHT / len(DEPTHS) - HEIGHT / 2) / FOCAL * depth for edge in (k, k + 1))}
+# The walls: strips of the picture's height, x from what the first frame shows to the last.
+WALLS = [{"z": depth,
+          "x": (-(WIDTH / 2) / FOCAL * depth,
+                WIDTH / 2 / FOCAL * depth + STEP * (COUNT - 1)),
+          "y": tuple((edge * HEIGHT / len(DEPTHS) - HEIGHT / 2) / FOCAL * depth
+                     for edge in (k, k + 1))}
          for k, depth in enumerate(DEPTHS)]
 QUADS = [[(w["x"][0], w["y"][0], w["z"]), (w["x"][1], w["y"][0], w["z"]),
           (w["x"][1], w["y"][1], w["z"]), (w["x"][0], w["y"][1], w["z"])] for w in WALLS]
@@ -123,7 +126,8 @@ def away_from_walls(points):
     """The distance of each point to the nearest wall."""
     nearest = np.full(len(points), np.inf)
     for wall in WALLS:
-        beyond = [np.maximum(0, np.maximum(wall[axis][0] - points[:, k], points[:, k] - wall[axis][1]))
+        beyond = [np.maximum(0, np.maximum(wall[axis][0] - points[:, k],
+                                           points[:, k] - wall[axis][1]))
                   for k, axis in enumerate("xy")]
         nearest = np.minimum(nearest, np.sqrt(beyond[0] ** 2 + beyond[1] ** 2 +
                                               (points[:, 2] - wall["z"]) ** 2))
@@ -150,14 +154,16 @@ def brute_force_scores(out, within=0.05):
     _, vertices, faces = read_ply(out / "room.ply")
     places = np.array([(v["x"], v["y"], v["z"]) for v in vertices])
     corners = places[np.array(faces)]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(sides, axis=1)
     rng = np.random.default_rng(5)
     chosen = rng.choice(len(corners), 60000, p=area / area.sum())
     u, v = np.sort(rng.random((2, len(chosen))), axis=0)
     weights = np.stack([u, v - u, 1 - v], 1)
     away = away_from_walls(np.einsum("ij,ijk->ik", weights, corners[chosen]))
     # True points: as many to the square metre on each wall, seen by at least two frames.
-    points = np.array([(x, y, w["z"]) for w in WALLS for x in np.arange(w["x"][0] + 0.05, w["x"][1], 0.1)
+    points = np.array([(x, y, w["z"]) for w in WALLS
+                       for x in np.arange(w["x"][0] + 0.05, w["x"][1], 0.1)
                        for y in np.arange(w["y"][0] + 0.05, w["y"][1], 0.1)])
     eyes = STEP * np.arange(COUNT)
     column = FOCAL * (points[:, :1] - eyes) / points[:, 2:] + (WIDTH - 1) / 2
@@ -166,7 +172,8 @@ def brute_force_scores(out, within=0.05):
     points = points[seen & (row >= 0) & (row < HEIGHT)]
     missing = np.full(len(points), np.inf)
     for triangle in corners[area > 0]:
-        near = np.flatnonzero(((points > triangle.min(0) - 0.3) & (points < triangle.max(0) + 0.3)).all(1))
+        low, high = triangle.min(0) - 0.3, triangle.max(0) + 0.3
+        near = np.flatnonzero(((points > low) & (points < high)).all(1))
         if len(near):
             missing[near] = np.minimum(missing[near], away_from_triangle(points[near], triangle))
     precision, recall = (away <= within).mean(), (missing <= within).mean()
@@ -437,8 +444,10 @@ class RoomTest(CliTest):
         self.assertEqual(truth, self.truth("--truth-mesh", mesh, "--truth",
                                            self.source / "groundtruth.txt"))
         both = self.folder / "both"
-        self.succeed(self.run_program("odometry", self.source, "-o", both, "--room", "--truth-mesh", mesh))
-        self.assertAlmostEqual(self.result(both)["room"]["truth"]["f_5cm"], truth["f_5cm"], delta=0.03)
+        self.succeed(self.run_program("odometry", self.source, "-o", both, "--room",
+                                      "--truth-mesh", mesh))
+        self.assertAlmostEqual(self.result(both)["room"]["truth"]["f_5cm"], truth["f_5cm"],
+                               delta=0.03)
 
     def depth_folder(self, name="depth", **options):
         for i in range(0, COUNT, 3):
@@ -469,10 +478,11 @@ class RoomTest(CliTest):
         def refused(words, *more):
             self.assert_refused(self.room(*more), words)
         whole = ply_mesh("binary_little_endian")
-        for data, words in ((b"solid\n", "no PLY"), (whole[:-40], "truncated"), (whole[:60], "header"),
+        for data, words in ((b"solid\n", "no PLY"), (whole[:-40], "truncated"),
+                            (whole[:60], "header"),
                             (whole.replace(b"element face 5", b"element face 0"), "faces"),
                             (ply_mesh().replace(b"4 0 1 2 3", b"4 0 1 2 99"), "99 of 20"),
-                            (ply_mesh().replace(b"property double z", b"property double w"), "x y z"),
+                            (ply_mesh().replace(b"double z", b"double w"), "x y z"),
                             (ply_mesh().replace(b" 200 ", b" nan ", 1), "nan")):
             refused(words, "--truth-mesh", self.write("bad.ply", data))
         refused("gone.ply", "--truth-mesh", self.folder / "gone.ply")

@@ -48,7 +48,8 @@ def measure(folder, out, arguments):
                             scale * source.centres[keys] @ R.T + t)
     row = truth.scores(boxes, samples[seen], positions, made.vertices["inferred"] > 0,
                        made.triangles, WITHIN)
-    return {**row, "keyframes": len(made.keyframes), "voxel": made.voxel, "vertices": len(positions),
+    return {**row, "keyframes": len(made.keyframes), "voxel": made.voxel,
+            "vertices": len(positions),
             "ms_depth": made.ms_depth, "ms_fusion": made.ms_fusion, "ms_mesh": made.ms_mesh}
 
 
