@@ -621,6 +621,24 @@ void test_up_is_up_however_far_the_cameras_look_down() {
   }
 }
 
+// A world that is turned against an upright one, as a map that began before the first attitude.
+void test_down_in_a_world_that_is_not_upright() {
+  const Matrix3 upright_from_world = held(20, 35, -50);
+  const Vector3 down = applied(transposed(upright_from_world), {0, 0, 1});
+  DownSum sum, other;
+  TEST_ASSERT_FALSE(sum.down().has_value());
+  for (int k = 0; k < 9; ++k) {
+    const Matrix3 world_from_cam = held(40 * k, 10, 5);
+    const Matrix3 error = held(0, k % 3 - 1, 1 - k % 3);  // a degree
+    sum.add(world_from_cam, product(error, product(upright_from_world, world_from_cam)));
+    other.add(world_from_cam, world_from_cam);
+    other.add(world_from_cam, product(upright_from_world, world_from_cam));
+  }
+  TEST_ASSERT_TRUE(sum.down().has_value());
+  for (size_t k = 0; k < 3; ++k) TEST_ASSERT_DOUBLE_WITHIN(0.02, down[k], (*sum.down())[k]);
+  TEST_ASSERT_FALSE(other.down().has_value());  // attitudes that contradict each other
+}
+
 int segments_of(std::initializer_list<int> of_keyframes) {
   std::vector<FlightKeyframe> keyframes;
   for (const int segment : of_keyframes) {
@@ -706,6 +724,7 @@ int main() {
   RUN_TEST(test_a_written_camera_reads_back_to_the_same_bits);
   RUN_TEST(test_matches_come_with_commas_blanks_and_names);
   RUN_TEST(test_up_is_up_however_far_the_cameras_look_down);
+  RUN_TEST(test_down_in_a_world_that_is_not_upright);
   RUN_TEST(test_the_cloud_has_the_points_whose_rays_meet_at_an_angle);
   RUN_TEST(test_segments_are_counted_that_have_keyframes);
   RUN_TEST(test_the_font_gets_letters_that_it_has);

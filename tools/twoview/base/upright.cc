@@ -36,4 +36,18 @@ Vector3 up_of_cameras(const std::vector<Matrix3>& world_from_cam, int turn_deg) 
   return {up[0], up[1], up[2]};
 }
 
+void DownSum::add(const Matrix3& world_from_cam, const Matrix3& upright_from_cam) {
+  const Matrix3& u = upright_from_cam;
+  const Vector3 down = applied(world_from_cam, {u[6], u[7], u[8]});
+  for (size_t k = 0; k < 3; ++k) sum_[k] += down[k];
+  ++count_;
+}
+
+std::optional<Vector3> DownSum::down() const {
+  constexpr double kLeastMean = 0.97;  // directions that spread by 20 degrees have it
+  const double length = norm(sum_);
+  if (!(length > kLeastMean * count_)) return {};
+  return Vector3{sum_[0] / length, sum_[1] / length, sum_[2] / length};
+}
+
 }  // namespace cli

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/upright.h"
 #include "files/camera_formats.h"
 #include "files/image_file.h"
 
@@ -220,6 +221,7 @@ void Flight::track_frame(SourceFrame frame) {
   record.relocated = state_.relocated != 0;
   record.loop_closed = state_.loop_closed != 0;
   record.attitude_ignored = state_.attitude_ignored != 0;
+  record.attitude = frame.world_from_cam;
   record.num_keypoints = state_.num_keypoints;
   record.num_matches = state_.num_matches;
   record.num_inliers = state_.num_inliers;
@@ -231,7 +233,6 @@ void Flight::track_frame(SourceFrame frame) {
     record.reference_id = state_.reference_id;
     record.reference_from_cam = pose_of(state_.reference_from_cam_R, state_.reference_from_cam_t);
   }
-  if (frame.world_from_cam) is_upright_ = true;
   picture_ = frame.luma;
   if (record.is_keyframe && options_.keeps_pictures)
     thumbnails_[static_cast<int>(given_.size())] = thumbnail_of(frame.luma);
@@ -239,6 +240,18 @@ void Flight::track_frame(SourceFrame frame) {
   masked_ += cli::masked_share(mask_);
   given_.push_back(frames_.size());
   frames_.push_back(record);
+}
+
+std::optional<Vector3> Flight::down(int32_t segment) const {
+  DownSum sum;
+  for (const FlightFrame& frame : frames_) {
+    if (!frame.attitude || frame.attitude_ignored) continue;
+    if (frame.origin != PoseOrigin::kNone && frame.segment == segment)
+      sum.add(frame.pose.R, *frame.attitude);
+    else if (frame.origin == PoseOrigin::kNone && frame.live_segment == segment)
+      sum.add(frame.live.R, *frame.attitude);
+  }
+  return sum.down();
 }
 
 // A point is made of keypoints of a keyframe now or later, so all of them keep their colour.

@@ -31,6 +31,7 @@ struct FlightFrame {
   bool unreadable = false;
   bool is_keyframe = false, relocated = false, loop_closed = false;
   bool attitude_ignored = false;
+  std::optional<Matrix3> attitude;  // world_from_cam of a world whose z axis points down
   int32_t num_keypoints = 0, num_matches = 0, num_inliers = 0;
   double time_ms = 0;  // CPU time of tv_odometry_track
   // As known when the frame was tracked; segment -1: no pose.
@@ -115,8 +116,9 @@ class Flight {
   // The picture of the last frame, as it was tracked; only within `after_frame` of track(), and
   // empty for a frame that could not be used.
   const cv::Mat& picture() const { return picture_; }
-  // Whether attitudes were given, so that the map's z axis points down.
-  bool is_upright() const { return is_upright_; }
+  // The direction down in a segment of the map by the attitudes of its frames; null where none was
+  // given. It is the z axis where the segment began with an attitude.
+  std::optional<Vector3> down(int32_t segment) const;
   // By how much a viewer turns the frames clockwise, degrees.
   int turn_deg() const { return source_.turn_deg(); }
   const tv_odometry_state& state() const { return state_; }
@@ -187,7 +189,6 @@ class Flight {
   std::map<int, Thumbnail> thumbnails_;  // by the number of the frame that was given
   // The colours of the keypoints of the frames that were given and became keyframes.
   std::map<int, std::vector<Rgb>> colours_;
-  bool is_upright_ = false;
   bool gap_ = false;  // a frame was left out before the next one
   int num_unreadable_ = 0;
   std::string first_problem_;

@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/output.h"
+#include "base/upright.h"
 #include "files/camera_formats.h"
 #include "files/image_file.h"
 #include "odometry/accuracy.h"
@@ -186,7 +187,6 @@ RoomSource room_source_of_flight(const std::string& folder, const std::string& m
   }
   if (made.scene.views.empty()) throw BadInput(folder + " has no frame with a pose");
   made.scene.points = read_colmap_points(file("colmap/points3D.txt"));
-  made.scene.is_upright_by_frames = true;
   made.scene.is_metric = text_of(json.value("scale", Json())) == "metric";
   if (made.scene.is_metric) made.scene.scale_sigma = number_of(json, "scale_sigma", 0.0);
   const SourceFrame first = first_frame(*made.source, indices);
@@ -374,7 +374,7 @@ RoomScene room_scene(const FlightResult& result) {
       scene.points.push_back({point.position[0], point.position[1], point.position[2]});
   scene.is_metric = result.json["scale"] == "metric";
   if (scene.is_metric) scene.scale_sigma = result.json["scale_sigma"].get<double>();
-  if (flight.is_upright()) scene.gravity = Vector3{0, 0, 1};
+  scene.gravity = flight.down(result.segment);
   return scene;
 }
 
@@ -387,6 +387,7 @@ void read_room_pictures(FrameSource& source, const Masks& masks, const cv::Mat& 
   const cv::Size size = builder.picture_size();
   cv::Mat still;
   if (!tracked_still.empty()) cv::resize(tracked_still, still, size, 0, 0, cv::INTER_NEAREST);
+  DownSum down;
   int num_used = 0;
   std::string problem;
   const auto wanted = [&](int index) {
@@ -407,12 +408,14 @@ void read_room_pictures(FrameSource& source, const Masks& masks, const cv::Mat& 
     } catch (const BadInput& e) {  // a picture that cannot be used is a missing one
       if (problem.empty()) problem = e.what();
     }
-    if (scene.is_upright_by_frames && frame.world_from_cam) builder.set_gravity({0, 0, 1});
-    builder.add_picture(views.at(frame.index), picture);
+    const size_t view = views.at(frame.index);
+    if (frame.world_from_cam) down.add(scene.views[view].R, *frame.world_from_cam);
+    builder.add_picture(view, picture);
     if (after_picture) after_picture();
     return true;
   };
   source.run(wanted, consume, stop);
+  if (!scene.gravity && down.down()) builder.set_gravity(*down.down());
   if (num_used == 0 && !stop)
     throw BadInput("no picture of the source could be used" +
                    (problem.empty() ? std::string() : ": " + problem));

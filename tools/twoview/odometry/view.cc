@@ -8,7 +8,9 @@ namespace cli {
 
 MapView view_of(const Flight& flight, const std::vector<FlightKeyframe>& keyframes,
                 int32_t segment) {
-  if (flight.is_upright()) return {{0, 1, 0, 0, 0, 1, 1, 0, 0}, true};  // z points down
+  constexpr double kLevel = 0.9994;  // of 2 degrees: the z axis points down
+  const std::optional<Vector3> measured = flight.down(segment);
+  if (measured && (*measured)[2] > kLevel) return {{0, 1, 0, 0, 0, 1, 1, 0, 0}, true};
   std::vector<Matrix3> held;
   for (const FlightKeyframe& key : keyframes) {
     if (key.keyframe.segment != segment) continue;
@@ -17,7 +19,7 @@ MapView view_of(const Flight& flight, const std::vector<FlightKeyframe>& keyfram
   }
   if (held.empty()) return {};
   const Vector3 up = up_of_cameras(held, flight.turn_deg());
-  const Vector3 down = {-up[0], -up[1], -up[2]};
+  const Vector3 down = measured.value_or(Vector3{-up[0], -up[1], -up[2]});
   // To the right of where the first keyframe looks; where it looks straight down, its own right.
   const Matrix3& first = held.front();
   Vector3 right = cross(down, {first[2], first[5], first[8]});
@@ -26,7 +28,7 @@ MapView view_of(const Flight& flight, const std::vector<FlightKeyframe>& keyfram
   for (double& value : right) value /= length;
   const Vector3 ahead = cross(right, down);
   return {{right[0], right[1], right[2], down[0], down[1], down[2], ahead[0], ahead[1], ahead[2]},
-          false};
+          measured.has_value()};
 }
 
 }  // namespace cli

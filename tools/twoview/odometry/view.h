@@ -18,7 +18,7 @@ struct MapView {
 };
 
 // Of a segment of the map. Ahead is where its first keyframe looks, or along the world's x axis
-// where attitudes say what that is.
+// where its z axis points down.
 MapView view_of(const Flight& flight, const std::vector<FlightKeyframe>& keyframes,
                 int32_t segment);
 

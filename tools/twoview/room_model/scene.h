@@ -33,9 +33,6 @@ struct RoomScene {
   bool is_metric = false;
   double scale_sigma = 0;          // relative, where is_metric; 0: not known
   std::optional<Vector3> gravity;  // the direction down in the world, of length 1
-  // Whether the world has its z axis down where frames come with measured attitudes, as the
-  // odometry's has.
-  bool is_upright_by_frames = false;
   // Whether the views follow each other in time, so that those nearby show the same place.
   bool is_flight = true;
 };
