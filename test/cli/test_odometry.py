@@ -410,7 +410,8 @@ class OdometryTest(CliTest):
         result = self.result()
         focal = result["focal_length"]
         self.assertEqual(list(focal),
-                         ["focal_35mm", "pixels", "sigma_percent", "uncertain", "k1", "k2", "source"])
+                         ["focal_35mm", "pixels", "sigma_percent", "uncertain", "k1", "k2",
+                          "source"])
         self.assertTrue(focal["uncertain"])
         self.assertEqual(focal["source"], "estimated")
         for name in ("k1", "k2"):  # null, or what a pinhole's few frames leave of it
