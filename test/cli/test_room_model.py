@@ -318,6 +318,23 @@ class RoomTest(CliTest):
         self.one_line(self.run_program("odometry", self.source, "-o", both, "--voxel", "0.1"),
                       "--room")
 
+    def test_up_is_where_attitudes_say_it_that_begin_after_the_film(self):
+        """The map begins without an attitude, so its z axis is the camera's, not down."""
+        late, both, roll = self.folder / "late", self.folder / "late_flight", math.radians(10)
+        shutil.copytree(self.source, late)
+        (late / "imu.txt").write_text("body_from_cam 0.5 0.5 0.5 0.5\n" + "".join(
+            f"{t:.9f} {math.cos(roll / 2):.9f} {math.sin(roll / 2):.9f} 0 0 0.01"
+            " nan nan nan nan nan nan\n" for t in TIMES[5:]))
+        self.succeed(self.run_program("odometry", late, "-o", both, "--room"))
+        self.succeed(self.room(folder=both))
+        # The camera looks along the nose: a roll to the right tilts down to the picture's right.
+        expected = (-math.sin(roll), -math.cos(roll), 0)
+        for folder in (both, self.out):
+            room = self.result(folder)["room"]
+            self.assertEqual(room["up_source"], "gravity")
+            for found, right in zip(room["up"], expected):
+                self.assertAlmostEqual(found, right, delta=0.02)
+
     def test_the_plan_has_the_walls_and_a_scale(self):
         self.succeed(self.room())
         svg = (self.out / "plan.svg").read_text()

@@ -216,16 +216,17 @@ TV_API void tv_room_mesh_options_init_sized(tv_room_mesh_options *options, size_
   tv_room_mesh_options_init_sized((options), sizeof *(options))
 
 /* Computes the surface: a vertex in each cell of eight voxels through which it passes, and two
-   triangles around each edge between two voxels that it crosses. Vertices are not repeated, and
-   each is of a triangle; the mesh is closed except where what lies beside was not seen. options:
-   null means the defaults. vertices, triangles: room for cap_vertices and cap_triangles; they
-   overlap nothing else. *num_vertices, *num_triangles: how many were written. Where that is too
-   little, TV_ERR_CAPACITY is returned, the arrays hold nothing of use, and the counts are those
-   that are enough: calling with capacities of 0 (and null arrays) asks for them. The order is that
-   in which the blocks lie in the room's memory, and the same on every CPU. The room is only read,
-   but for scratch in its memory. Takes a step for each voxel of the room. Returns TV_ERR_NULL,
-   TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (an option, a capacity below 0), TV_ERR_NOT_FINITE (an
-   option), TV_ERR_CAPACITY, TV_ERR_OVERLAP. */
+   triangles around each edge between two voxels that it crosses. Vertices are not repeated, each is
+   of a triangle, and the mesh is closed except where what lies beside was not seen.
+   options: null means the defaults.
+   vertices, triangles: room for cap_vertices and cap_triangles; they overlap nothing else.
+   *num_vertices, *num_triangles: how many were written. Where that is too little, TV_ERR_CAPACITY
+   is returned, the arrays hold nothing of use, and the counts are those that are enough: calling
+   with capacities of 0 (and null arrays) asks for them.
+   The order is that in which the blocks lie in the room's memory, and the same on every CPU. The
+   room is only read, but for scratch in its memory. Takes a step for each voxel of the room.
+   Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (an option, a capacity below 0),
+   TV_ERR_NOT_FINITE (an option), TV_ERR_CAPACITY, TV_ERR_OVERLAP. */
 TV_API tv_status tv_room_mesh(tv_room *room, const tv_room_mesh_options *options,
                               tv_room_vertex *vertices, int32_t cap_vertices,
                               tv_room_triangle *triangles, int32_t cap_triangles,

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <initializer_list>
 
 #include "api/sized.h"
 #include "api/validate.h"
@@ -50,14 +49,10 @@ double field_of(const Camera& lens, bool across) {
   const tv_camera& camera = lens.model;
   const double right = camera.width - 1, low = camera.height - 1;
   const double of_pinhole = across ? right / camera.fx : low / camera.fy;
+  const double middle = across ? camera.cy : camera.cx, end = across ? low : right;
   double most = of_pinhole;
   for (int k = 0; k < 3; ++k) {
-    const double along = across ? (k == 0   ? camera.cy
-                                   : k == 1 ? 0
-                                            : low)
-                                : (k == 0   ? camera.cx
-                                   : k == 1 ? 0
-                                            : right);
+    const double along = k == 0 ? middle : k == 1 ? 0 : end;
     const Vec2 first = across ? Vec2(0, along) : Vec2(along, 0);
     const Vec2 last = across ? Vec2(right, along) : Vec2(along, low);
     Vec3 a, b;
@@ -72,7 +67,7 @@ double field_of(const Camera& lens, bool across) {
   return std::min(most / of_pinhole, kMost);
 }
 
-// The grid of at most max_pixels pixels that shows what the image shows in the middle of its edges.
+// The grid of at most max_pixels pixels that shows what the image shows, to its corners.
 MapGrid grid_of(tv_camera camera, const tv_depth_options& options) {
   if (camera.model != TV_CAMERA_PINHOLE) {
     const Camera lens = prepare_camera(camera);

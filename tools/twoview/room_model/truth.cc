@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdio>
 #include <numeric>
+#include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 #include <unordered_set>
 
@@ -192,15 +193,11 @@ Placement registered(const std::vector<JudgedPoint>& points, const TriangleMesh&
     for (int k = 0; k < 7; ++k) normal(k, k) += kRidge * (normal(k, k) + 1);
     cv::Matx<double, 7, 1> by;
     if (!cv::solve(normal, right, by, cv::DECOMP_CHOLESKY)) break;
-    const Vector3 turn{by(0), by(1), by(2)};
-    const double angle = norm(turn), scale = std::exp(by(6));
-    Matrix3 R{1, 0, 0, 0, 1, 0, 0, 0, 1};  // exp([turn]x)
-    if (angle > 0) {
-      const double a = std::sin(angle) / angle, b = (1 - std::cos(angle)) / (angle * angle);
-      const Matrix3 K{0, -turn[2], turn[1], turn[2], 0, -turn[0], -turn[1], turn[0], 0};
-      const Matrix3 square = product(K, K);
-      for (size_t k = 0; k < 9; ++k) R[k] += a * K[k] + b * square[k];
-    }
+    cv::Matx33d turn;
+    cv::Rodrigues(cv::Vec3d(by(0), by(1), by(2)), turn);
+    Matrix3 R;
+    std::copy_n(turn.val, 9, R.begin());
+    const double scale = std::exp(by(6));
     // About the centre: y = scale R (p - centre) + centre + shift.
     Placement moved;
     moved.scale = scale;
