@@ -737,6 +737,51 @@ static void digest_dense(const pair *p, tv_context *context, const matched *m,
   print(p, context, "dense");
 }
 
+/* The depth map of the first image from both. */
+static void digest_depth(const pair *p, tv_context *context, const tv_two_view *pose) {
+  tv_depth_options options;
+  tv_depth_view views[2];
+  tv_depth_arrays arrays;
+  tv_camera map;
+  size_t bytes, num;
+  uint8_t *block;
+  uintptr_t memory;
+  int i, r;
+  start();
+  tv_depth_options_init(&options);
+  options.max_pixels = 20000;
+  options.near_depth = 2; /* in baselines */
+  options.far_depth = 60;
+  memset(views, 0, sizeof views);
+  for (i = 0; i < 2; ++i) {
+    views[i].image = p->image[i];
+    views[i].camera = &p->camera[i];
+  }
+  /* R and t map camera 0 to camera 1. */
+  for (i = 0; i < 3; ++i) {
+    views[0].world_from_cam_R[4 * i] = 1;
+    for (r = 0; r < 3; ++r) {
+      views[1].world_from_cam_R[3 * i + r] = pose->R[3 * r + i];
+      views[1].world_from_cam_t[i] -= pose->R[3 * r + i] * pose->t[r];
+    }
+  }
+  must("depth_map_camera", tv_depth_map_camera(&p->camera[0], &options, &map));
+  must("depth_size", tv_depth_size(&p->camera[0], &options, &bytes));
+  num = (size_t)map.width * (size_t)map.height;
+  block = (uint8_t *)malloc(bytes + TV_CONTEXT_ALIGNMENT + 10 * num + 4);
+  if (block == NULL) fail("depth", TV_ERR_MEMORY);
+  memory = (uintptr_t)block + TV_CONTEXT_ALIGNMENT - 1;
+  memory -= memory % TV_CONTEXT_ALIGNMENT;
+  arrays.distance = (float *)(memory + (bytes + 3) / 4 * 4);
+  arrays.sigma = arrays.distance + num;
+  arrays.witnesses = (uint8_t *)(arrays.sigma + num);
+  arrays.grey = arrays.witnesses + num;
+  must("sweep_depth", tv_sweep_depth(views, 2, &options, (void *)memory, bytes, &arrays));
+  add_bytes(arrays.distance, 10 * num);
+  free(block);
+  print(p, context, "depth");
+}
+
 enum { ROOM_SIDE = 160, ROOM_PIXELS = ROOM_SIDE * ROOM_SIDE };
 
 /* What the pair's camera, reduced, sees in a box from a place within, turned by a quarter around
@@ -933,6 +978,7 @@ static void digest_pair(const pair *p, int32_t kernels) {
   digest_guided(p, context, &f, &pose);
   digest_points(p, context, &m, &pose, points);
   digest_dense(p, context, &m, &pose, points);
+  digest_depth(p, context, &pose);
   digest_bundle(p, context, &m, &pose, points);
   digest_absolute_pose(p, context);
   digest_window(p, context);

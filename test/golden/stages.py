@@ -34,6 +34,7 @@ STAGES = {
                     "iterative_ls", "midpoint"],
     "bundle": ["point_covariances", "bundle"],
     "dense": ["dense"],
+    "depth": ["depth"],
     "room": ["room"],
     "absolute_pose": ["absolute_pose"],
     "window": ["window"],

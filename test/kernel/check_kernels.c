@@ -987,6 +987,103 @@ static void case_sample_span(trial *t) {
   }
   REPEAT(t, tvk_dense_of(t->set)->sample_span(image, width, height, width, u, v, count, out));
 }
+
+static void case_census_words(trial *t) {
+  const int32_t width = pick(t, 1, 200, 960);
+  uint32_t *census = OUTPUT(t, uint32_t, width + TVK_DENSE_BLOCK);
+  const uint8_t *rows[2 * TVK_SWEEP_DOWN + 1];
+  int k;
+  for (k = 0; k < 2 * TVK_SWEEP_DOWN + 1; ++k) rows[k] = dense_bytes(t, width, 255);
+  REPEAT(t, tvk_dense_of(t->set)->census_words(rows, width, census));
+}
+
+static uint32_t random_census(trial *t) {
+  const uint32_t low = (uint32_t)random_int(&t->seed, 0, 65535);
+  const uint32_t high = (uint32_t)random_int(&t->seed, 0, 32767);
+  return random_int(&t->seed, 0, 5) == 0 ? TVK_SWEEP_NONE : high << 16 | low;
+}
+
+/* Up to six views of three lines; planes from beyond one edge to beyond the other. */
+static void case_plane_costs(trial *t) {
+  const int32_t width = pick(t, 1, 40, 320), count = TVK_DENSE_BLOCK * pick(t, 1, 3, 3);
+  const int32_t num_views = pick(t, 1, 6, 4), columns = 3 * width;
+  uint8_t *costs = OUTPUT(t, uint8_t, width * count);
+  uint32_t *own = INPUT(t, uint32_t, 2 * width);
+  tvk_swept_view views[6];
+  int32_t v, k;
+  for (k = 0; k < 2 * width; ++k) own[k] = random_census(t);
+  memset(views, 0, sizeof views);
+  for (v = 0; v < num_views; ++v) {
+    uint32_t *census = INPUT(t, uint32_t, 3 * columns);
+    float *scale = INPUT(t, float, count), *shift = INPUT(t, float, count);
+    int32_t *row = INPUT(t, int32_t, count);
+    for (k = 0; k < 3 * columns; ++k) census[k] = random_census(t);
+    for (k = 0; k < count; ++k) {
+      scale[k] = (float)(2 + 0.1 * random_unit(&t->seed));
+      shift[k] = (float)(2.0 * width * (random_unit(&t->seed) - 0.5));
+      row[k] = columns * random_int(&t->seed, 0, 2);
+    }
+    views[v].census = census;
+    views[v].scale = scale;
+    views[v].shift = shift;
+    views[v].row = row;
+    views[v].last = columns - 1;
+  }
+  REPEAT(t, tvk_dense_of(t->set)->plane_costs(views, num_views, own, width, count, costs));
+  for (k = 0; k < width * count; ++k) TEST_ASSERT_TRUE(costs[k] <= TVK_SWEEP_BITS);
+}
+
+static void case_sum_planes(trial *t) {
+  const int32_t width = pick(t, 1, 60, 320), count = TVK_DENSE_BLOCK * pick(t, 1, 3, 3);
+  const int32_t pitch = count + 2 * TVK_DENSE_PAD;
+  uint8_t *const kept_before = dense_bytes(t, width * count, 252);
+  uint8_t *kept = OUTPUT(t, uint8_t, width * count);
+  uint8_t *across = dense_bytes(t, width + 1, 255);
+  tvk_swept_row row;
+  int32_t x, k, p;
+  memset(&row, 0, sizeof row);
+  row.width = width;
+  row.count = count;
+  row.step = random_int(&t->seed, 0, 1) ? 1 : -1;
+  row.costs = dense_bytes(t, width * count, TVK_SWEEP_BITS);
+  row.kept = kept;
+  row.across = across;
+  for (x = 0; x <= width; ++x) {
+    across[x] = (uint8_t)(TVK_DENSE_SMALL + across[x] % (TVK_DENSE_LARGE - TVK_DENSE_SMALL + 1));
+  }
+  for (p = 0; p < 3; ++p) {
+    uint8_t *before = dense_bytes(t, width * pitch, TVK_SWEEP_BITS + TVK_DENSE_LARGE);
+    uint8_t *least = INPUT(t, uint8_t, width), *large = dense_bytes(t, width, 255);
+    for (x = 0; x < width; ++x) {
+      uint8_t *const line = before + x * pitch;
+      large[x] = (uint8_t)(TVK_DENSE_SMALL + large[x] % (TVK_DENSE_LARGE - TVK_DENSE_SMALL + 1));
+      memset(line, TVK_DENSE_NEVER, TVK_DENSE_PAD);
+      memset(line + TVK_DENSE_PAD + count, TVK_DENSE_NEVER, TVK_DENSE_PAD);
+      least[x] = 255;
+      for (k = 0; k < count; ++k) {
+        if (line[TVK_DENSE_PAD + k] < least[x]) least[x] = line[TVK_DENSE_PAD + k];
+      }
+    }
+    row.before[p] = before;
+    row.least_before[p] = least;
+    row.large[p] = large;
+    row.after[p] = OUTPUT(t, uint8_t, width * pitch);
+    row.least_after[p] = OUTPUT(t, uint8_t, width);
+  }
+  row.scratch = OUTPUT(t, uint8_t, 3 * pitch);
+  memcpy(kept, kept_before, (size_t)(width * count));
+  REPEAT(t, tvk_dense_of(t->set)->sum_planes(&row));
+}
+
+static void case_choose_planes(trial *t) {
+  const int32_t width = pick(t, 1, 60, 320), count = TVK_DENSE_BLOCK * pick(t, 1, 3, 3);
+  const uint8_t *sums = dense_bytes(t, width * count, 255);
+  int16_t *planes = OUTPUT(t, int16_t, width);
+  uint8_t *margin = OUTPUT(t, uint8_t, width);
+  int32_t x;
+  REPEAT(t, tvk_dense_of(t->set)->choose_planes(sums, width, count, planes, margin));
+  for (x = 0; x < width; ++x) TEST_ASSERT_TRUE(planes[x] >= 0 && planes[x] < count);
+}
 #endif
 
 static trial make_trial(const tvk_table *set, uint64_t seed, int typical, int64_t calls) {

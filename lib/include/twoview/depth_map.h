@@ -31,9 +31,9 @@ typedef struct tv_depth_options {
      reference image (tv_depth_map_camera), or reduced to so many pixels. Time and memory grow in
      proportion. */
   int32_t max_pixels;
-  /* The most planes, [16, 256], default 96, rounded down to a multiple of 8. Two neighbouring
-     planes are a pixel of the map apart in the image with the longest baseline, or farther where
-     that would take more planes. Time and memory grow in proportion. */
+  /* The most planes, [16, 256], default 96, rounded up to a multiple of 32. Two neighbouring
+     planes are at most a pixel of the map apart in the image with the longest baseline, or farther
+     where that would take more planes. Time and memory grow in proportion. */
   int32_t max_planes;
   /* The most views, [2, TV_DEPTH_MAX_VIEWS], default 5, the reference included. Memory and time
      grow in proportion. */
@@ -102,7 +102,7 @@ TV_API tv_status tv_depth_size(const tv_camera *reference, const tv_depth_option
    arrays: what is written; nothing of it overlaps anything else (TV_ERR_OVERLAP).
    A pixel is unknown where fewer than two views show it, where the best plane is the first or the
    last one, and where the standard deviation is above max_relative_sigma.
-   The result has the same bits on every CPU. Takes pixels x planes x views steps; 0.2 s for the
+   The result has the same bits on every CPU. Takes pixels x planes x views steps; 0.06 s for the
    defaults on a desktop core. Needs no context. Thread-safe.
    Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (an option, the range, num_views, an
    image, R), TV_ERR_NOT_FINITE (an option, R or t), TV_ERR_CAMERA, TV_ERR_ALIGNMENT,

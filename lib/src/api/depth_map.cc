@@ -31,7 +31,8 @@ tv_status read_options(const tv_depth_options* given, tv_depth_options* options)
                      within(options->max_planes, 16, 256) &&
                      within(options->max_views, 2, TV_DEPTH_MAX_VIEWS) &&
                      options->max_relative_sigma > 0 && options->max_relative_sigma <= 1;
-  options->max_planes &= ~7;  // the matcher takes eight planes at a time
+  constexpr int32_t kBlock = TVK_DENSE_BLOCK;
+  options->max_planes = (options->max_planes + kBlock - 1) / kBlock * kBlock;
   return valid ? TV_OK : TV_ERR_ARGUMENT;
 }
 
@@ -162,8 +163,9 @@ Vec3 shift_of(const tv_depth_view& reference, const tv_depth_view& view) {
 Planes planes_of(const tv_depth_options& options, const MapGrid& grid, double longest) {
   const double first = 1 / options.far_depth, range = 1 / options.near_depth - first;
   const double pixels = std::min(range * grid.focal * longest, 1e6);
-  const int32_t wanted = (static_cast<int32_t>(pixels) + 2 + 7) / 8 * 8;
-  const int32_t count = std::min(std::max(wanted, 16), options.max_planes);
+  constexpr int32_t kBlock = TVK_DENSE_BLOCK;
+  const int32_t wanted = (static_cast<int32_t>(pixels) + 1 + kBlock) / kBlock * kBlock;
+  const int32_t count = std::min(wanted, options.max_planes);
   return {first, range / (count - 1), count};
 }
 
@@ -249,6 +251,7 @@ tv_status tv_sweep_depth(const tv_depth_view* views, int32_t num_views,
   status = tv::check_overlap(views, num_views, pixels, *arrays, memory, size_bytes);
   if (status != TV_OK) return status;
 
+  const tvk_dense_table& kernels = *tvk_dense_of(tvk_select(TV_KERNELS_AUTO));
   tv::Arena arena = tv::arena_over(memory, size_bytes);
   const tv::Mat3 axes = tv::rotation_of(views[0]);
   tv::ParallelView reference;
@@ -258,8 +261,8 @@ tv_status tv_sweep_depth(const tv_depth_view* views, int32_t num_views,
     tv::ParallelView& view = v == 0 ? reference : others[v - 1].view;
     tv::size_parallel_view(grid, v > 0, &view);
     tv::make_parallel_view(views[v].image, tv::prepare_camera(*views[v].camera),
-                           tv::transposed_times(tv::rotation_of(views[v]), axes), grid, arena,
-                           &view);
+                           tv::transposed_times(tv::rotation_of(views[v]), axes), grid, kernels,
+                           arena, &view);
     if (v == 0) continue;
     const tv::Vec3 shift = tv::shift_of(views[0], views[v]);
     others[v - 1].shift = shift;
@@ -269,7 +272,7 @@ tv_status tv_sweep_depth(const tv_depth_view* views, int32_t num_views,
   const tv::PlaneSweep sweep = {grid, tv::planes_of(checked, grid, longest), &reference, others,
                                 num_views - 1};
   const tv::SweptRows rows = {&writer, tv::write_row};
-  tv::sweep_planes(sweep, rows, arena);
+  tv::sweep_planes(sweep, kernels, rows, arena);
   if (arrays->grey != nullptr) {
     for (int32_t y = 0; y < grid.height; ++y) {
       const uint8_t* const from = reference.grey + static_cast<ptrdiff_t>(2 * y) * reference.width;

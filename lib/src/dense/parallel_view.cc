@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dense/sweep.h"
 #include "geometry/triangulation_frame.h"
 
 namespace tv {
@@ -112,39 +113,20 @@ void sample_line(const tv_image& image, const Node* upper, const Node* lower, in
   }
 }
 
-// The census of each element: its window has every second element, as the map has pixels. The bits
-// are gathered eight at a time in bytes, of which a vector holds more than of words.
-// scratch: four rows of the view.
-void census_of(const ParallelView& view, uint8_t* scratch) {
-  const ptrdiff_t width = view.width;
-  const int32_t across = 2 * kCensusAcross, down = 2 * kCensusDown;
+// The census of each element: its window has every second element, as the map has pixels.
+void census_of(const ParallelView& view, const tvk_dense_table& kernels) {
+  constexpr int32_t kDown = TVK_SWEEP_DOWN;
   for (int32_t y = 0; y < view.height; ++y) {
-    uint32_t* const census = view.census + y * width;
-    for (int32_t x = 0; x < view.width; ++x) census[x] = kNoCensus;
-    if (y < down || y >= view.height - down || view.width <= 2 * across) continue;
-    const uint8_t* const middle = view.grey + y * width;
-    for (ptrdiff_t i = 0; i < 4 * width; ++i) scratch[i] = 0;
-    int32_t bit = 0;
-    for (int32_t dy = -down; dy <= 0; dy += 2) {
-      const int32_t last = dy < 0 ? across : -2;
-      for (int32_t dx = -across; dx <= last; dx += 2, ++bit) {
-        const uint8_t *before = middle + dy * width + dx, *after = middle - dy * width - dx;
-        uint8_t* const bits = scratch + bit / 8 * width;
-        for (int32_t x = across; x < view.width - across; ++x) {
-          bits[x] = static_cast<uint8_t>(bits[x] + bits[x] + (before[x] < after[x] ? 1 : 0));
-        }
-      }
+    uint32_t* const census = view.census + static_cast<ptrdiff_t>(y) * view.width;
+    if (y < 2 * kDown || y >= view.height - 2 * kDown) {
+      for (int32_t x = 0; x < view.width; ++x) census[x] = kNoCensus;
+      continue;
     }
-    // The corners of the window are outside before anything else of it is.
-    const uint8_t *above = middle - down * width, *below = middle + down * width;
-    for (int32_t x = across; x < view.width - across; ++x) {
-      const bool whole = above[x - across] != 0 && above[x + across] != 0 &&
-                         below[x - across] != 0 && below[x + across] != 0 && middle[x] != 0;
-      const uint32_t bits = uint32_t{scratch[x]} | uint32_t{scratch[x + width]} << 8 |
-                            uint32_t{scratch[x + 2 * width]} << 16 |
-                            uint32_t{scratch[x + 3 * width]} << 24;
-      census[x] = whole ? bits : kNoCensus;
+    const uint8_t* rows[2 * kDown + 1];
+    for (int32_t v = -kDown; v <= kDown; ++v) {
+      rows[v + kDown] = view.grey + static_cast<ptrdiff_t>(y + 2 * v) * view.width;
     }
+    kernels.census_words(rows, view.width, census);
   }
 }
 
@@ -167,7 +149,7 @@ void size_parallel_view(const MapGrid& grid, bool with_margin, ParallelView* vie
 
 size_t parallel_view_bytes(const ParallelView& view) {
   const size_t count = static_cast<size_t>(view.width) * static_cast<size_t>(view.height);
-  return arena_bytes<uint8_t>(count) + arena_bytes<uint32_t>(count);
+  return pixels_bytes(count) + arena_bytes<uint32_t>(count + TVK_DENSE_BLOCK);
 }
 
 size_t parallel_view_scratch_bytes(const ParallelView& view, const tv_camera& camera,
@@ -178,15 +160,15 @@ size_t parallel_view_scratch_bytes(const ParallelView& view, const tv_camera& ca
   const size_t samples = static_cast<size_t>(view.width) + 1;
   return (times == 1 ? 0 : arena_bytes<uint8_t>(reduced)) +
          2 * arena_bytes<Node>(static_cast<size_t>(nodes_of(view.width + 1)) + 1) +
-         2 * arena_bytes<uint8_t>(samples) +
-         arena_bytes<uint8_t>(4 * static_cast<size_t>(view.width));
+         2 * arena_bytes<uint8_t>(samples);
 }
 
 void make_parallel_view(const tv_image& image, const Camera& camera, const Mat3& cam_from_map,
-                        const MapGrid& grid, Arena& arena, ParallelView* view) {
+                        const MapGrid& grid, const tvk_dense_table& kernels, Arena& arena,
+                        ParallelView* view) {
   const size_t count = static_cast<size_t>(view->width) * static_cast<size_t>(view->height);
-  view->grey = arena_alloc<uint8_t>(arena, count);
-  view->census = arena_alloc<uint32_t>(arena, count);
+  view->grey = pixels_alloc(count, arena);
+  view->census = arena_alloc<uint32_t>(arena, count + TVK_DENSE_BLOCK);
   const ArenaScope scope(arena);
   const int32_t times = reduction_of(camera.model, grid);
   const tv_image reduced = reduce(image, times, arena);
@@ -211,7 +193,7 @@ void make_parallel_view(const tv_image& image, const Camera& camera, const Mat3&
       grey[x] = static_cast<uint8_t>(whole ? mean : 0);
     }
   }
-  census_of(*view, arena_alloc<uint8_t>(arena, 4 * static_cast<size_t>(view->width)));
+  census_of(*view, kernels);
 }
 
 }  // namespace tv

@@ -8,6 +8,7 @@
 
 #include "base/arena.h"
 #include "geometry/camera.h"
+#include "kernels/dense.h"
 #include "twoview/image.h"
 
 namespace tv {
@@ -21,11 +22,7 @@ struct MapGrid {
 // The grid of at most max_pixels pixels that covers the middle of what the camera sees.
 MapGrid map_grid_of(const tv_camera& camera, int32_t max_pixels);
 
-// A census that stands for no pixel: a census has 31 bits.
-inline constexpr uint32_t kNoCensus = 0xffffffffu;
-
-// The window of the census in pixels of the map: (2 kCensusAcross + 1) x (2 kCensusDown + 1).
-inline constexpr int32_t kCensusAcross = 4, kCensusDown = 3;
+inline constexpr uint32_t kNoCensus = TVK_SWEEP_NONE;
 
 // A view at twice the resolution of the map and with a margin around it. The element (x, y) belongs
 // to the pixel (x / 2 - margin_x, y / 2 - margin_y) of the map; each is the mean of 2 x 2 samples,
@@ -33,7 +30,7 @@ inline constexpr int32_t kCensusAcross = 4, kCensusDown = 3;
 struct ParallelView {
   int32_t width, height, margin_x, margin_y;
   uint8_t* grey;     // 0: no pixel; others are at least 1
-  uint32_t* census;  // kNoCensus where the window is not wholly inside
+  uint32_t* census;  // kNoCensus where the window is not wholly inside; has room for a block more
 };
 
 // The size of a view of the grid; with_margin: a quarter of the map on each side.
@@ -46,6 +43,7 @@ size_t parallel_view_scratch_bytes(const ParallelView& view, const tv_camera& ca
 
 // Resamples the image. cam_from_map: the rotation from the axes of the map to those of the camera.
 void make_parallel_view(const tv_image& image, const Camera& camera, const Mat3& cam_from_map,
-                        const MapGrid& grid, Arena& arena, ParallelView* view);
+                        const MapGrid& grid, const tvk_dense_table& kernels, Arena& arena,
+                        ParallelView* view);
 
 }  // namespace tv

@@ -7,10 +7,12 @@
 
 #include "base/arena.h"
 #include "dense/parallel_view.h"
+#include "kernels/dense.h"
 
 namespace tv {
 
-// The planes of inverse depth first + k * step, k in [0, count); count is a multiple of 8.
+// The planes of inverse depth first + k * step, k in [0, count); count is a multiple of
+// TVK_DENSE_BLOCK.
 struct Planes {
   double first, step;
   int32_t count;
@@ -48,6 +50,7 @@ struct SweptRows {
 size_t sweep_planes_bytes(const MapGrid& grid, int32_t max_planes, int32_t num_views);
 
 // Matches, and hands the rows over from the last one to the first one.
-void sweep_planes(const PlaneSweep& sweep, const SweptRows& rows, Arena& arena);
+void sweep_planes(const PlaneSweep& sweep, const tvk_dense_table& kernels, const SweptRows& rows,
+                  Arena& arena);
 
 }  // namespace tv

@@ -25,8 +25,8 @@ struct RowPair {
   const uint8_t* row1(int32_t y) const { return pixels1 + static_cast<ptrdiff_t>(y) * columns1(); }
 };
 
-// Resampled images have a frame of so many bytes before and behind them, since kernels read whole
-// blocks and their neighbours.
+// Resampled images, here and of depth maps, have a frame of so many bytes before and behind them,
+// since kernels read whole blocks and their neighbours.
 inline constexpr size_t kPixelsFrame = 2 * TVK_DENSE_BLOCK;
 size_t pixels_bytes(size_t cells);
 uint8_t* pixels_alloc(size_t cells, Arena& arena);

@@ -23,8 +23,40 @@ enum {
   TVK_DENSE_REACH = 3,   /* cells around the middle of a window of least squares */
   TVK_DENSE_SUMS = 10,   /* of such a window */
   TVK_DENSE_NODES = 8,   /* columns between two at which the lens model is asked */
-  TVK_DENSE_SPAN = 16    /* columns of a block of cells */
+  TVK_DENSE_SPAN = 16,   /* columns of a block of cells */
+  TVK_SWEEP_ACROSS = 4,  /* pixels of the map around the middle of a census of words */
+  TVK_SWEEP_DOWN = 3,
+  TVK_SWEEP_BITS = 31,  /* of such a census */
+  TVK_SWEEP_CHANCE = 15 /* the cost of a plane at a place that no view shows, as chance gives it */
 };
+
+/* A census that stands for no pixel. The highest bit of any other is 0. */
+#define TVK_SWEEP_NONE 0xffffffffu
+
+/* A view, and where the planes put a row of the map in it: column x at the element scale x + shift,
+   rounded down, at most `last`, behind element `row`. The elements at the edges have no census. */
+typedef struct tvk_swept_view {
+  const uint32_t *census;
+  const float *scale, *shift; /* of each plane */
+  const int32_t *row;
+  int32_t last, reserved;
+} tvk_swept_view;
+
+/* A row of the map and what four paths bring: along it, and from the row before. */
+typedef struct tvk_swept_row {
+  int32_t width, count; /* count: planes, a multiple of TVK_DENSE_BLOCK */
+  int32_t step;         /* 1: the paths go to larger columns and rows, -1: to smaller ones */
+  int32_t reserved;
+  const uint8_t *costs;     /* count for each column */
+  uint8_t *kept;            /* the same: sums of paths, to which those of these four are added */
+  const uint8_t *across;    /* as of tvk_dense_row, with an entry behind the last column */
+  const uint8_t *large[3];  /* of each column, from the columns x - 1, x, x + 1 of the row before */
+  const uint8_t *before[3]; /* path costs of that row, lines of count + 2 TVK_DENSE_PAD */
+  uint8_t *after[3];        /* and those of this row */
+  const uint8_t *least_before[3]; /* of each column, the least of them */
+  uint8_t *least_after[3];
+  uint8_t *scratch; /* 3 lines of count + 2 TVK_DENSE_PAD */
+} tvk_swept_row;
 
 /* The pixels of TVK_DENSE_NODES columns of a row, as polynomials of the column; none if the lens
    model is not smooth there. */
@@ -118,7 +150,22 @@ typedef struct tvk_dense_row {
    image.
 
    sample_span: the grey level of an image at each of `count` such places, by bilinear
-   interpolation, at least 1; 0 where u is negative. */
+   interpolation, at least 1; 0 where u is negative.
+
+   census_words: rows[0..6] are every second row of a view, from 2 TVK_SWEEP_DOWN above to as many
+   below. The census of each element, whose window has every second element: whether of each pair of
+   opposite ones the upper or left one is darker. TVK_SWEEP_NONE where the window is not wholly
+   inside, which is where the element or a corner is 0.
+
+   plane_costs: of each column x, whose census is census[2 x], and each plane, the mean number of
+   bits in which the census differs from those of the views that have one there, without the worst
+   of several; 0 where the column has no census.
+
+   sum_planes: follows the paths, and adds their sums, less the least of the column, to `kept`, up
+   to 255.
+
+   choose_planes: of each column, the plane of the least sum, the first of several, and how much
+   more the least sum of any plane has that is more than two away. */
 #define TVK_DENSE_LIST(X)                                                                         \
   X(census_codes, void,                                                                           \
     (const uint8_t *const *rows, int32_t width, int32_t tolerance, uint8_t *brighter,             \
@@ -143,7 +190,14 @@ typedef struct tvk_dense_row {
      int32_t *v))                                                                                 \
   X(sample_span, void,                                                                            \
     (const uint8_t *image, int32_t width, int32_t height, int64_t stride, const int32_t *u,       \
-     const int32_t *v, int32_t count, uint8_t *out))
+     const int32_t *v, int32_t count, uint8_t *out))                                              \
+  X(census_words, void, (const uint8_t *const *rows, int32_t width, uint32_t *census))            \
+  X(plane_costs, void,                                                                            \
+    (const tvk_swept_view *views, int32_t num_views, const uint32_t *census, int32_t width,       \
+     int32_t count, uint8_t *costs))                                                              \
+  X(sum_planes, void, (const tvk_swept_row *row))                                                 \
+  X(choose_planes, void,                                                                          \
+    (const uint8_t *sums, int32_t width, int32_t count, int16_t *planes, uint8_t *margin))
 
 typedef struct tvk_dense_table {
 #define TVK_MEMBER(name, result, parameters) result(*name) parameters;

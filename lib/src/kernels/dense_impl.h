@@ -14,6 +14,7 @@ TVK_DENSE_LIST(TVK_DECLARE)
 #include "kernels/block.h"
 #include "kernels/paths.h"
 #include "kernels/patches.h"
+#include "kernels/planes.h"
 /* clang-format on */
 
 extern const tvk_dense_table TVK_DENSE_TABLE;

@@ -75,6 +75,40 @@ void TVK_DENSE(cell_sums)(const tvk_dense_rows *rows, int32_t pitch, int32_t fir
   }
 }
 
+void TVK_DENSE(smooth_row)(const uint8_t *const *rows, int32_t width, uint8_t *restrict out) {
+  for (int32_t x = 0; x < width; x += TVK_DENSE_SPAN) {
+    const uint8_t *const a = rows[0] + x, *const b = rows[1] + x, *const c = rows[2] + x;
+    for (int i = 0; i < TVK_DENSE_SPAN; ++i) {
+      const uint16_t corners = (uint16_t)(a[i - 1] + c[i - 1] + a[i + 1] + c[i + 1]);
+      const uint16_t sides = (uint16_t)(a[i] + c[i] + b[i - 1] + b[i + 1]);
+      const uint16_t mean = (uint16_t)((uint16_t)(corners + 2 * sides + 4 * b[i] + 8) >> 4);
+      out[x + i] = (uint8_t)(b[i] == 0 ? 0 : mean > 1 ? mean : 1);
+    }
+  }
+  out[0] = rows[1][0];
+  out[width - 1] = rows[1][width - 1];
+}
+
+void TVK_DENSE(sample_span)(const uint8_t *image, int32_t width, int32_t height, int64_t stride,
+                            const int32_t *u, const int32_t *v, int32_t count, uint8_t *out) {
+  for (int32_t x = 0; x < count; ++x) {
+    if (u[x] < 0) {
+      out[x] = 0;
+      continue;
+    }
+    const int32_t column = u[x] >> 16, line = v[x] >> 16;
+    const uint8_t *p = image + line * stride + column;
+    const ptrdiff_t right = column + 1 < width ? 1 : 0;
+    const uint8_t *q = line + 1 < height ? p + stride : p;
+    const int32_t du = u[x] >> 8 & 255, dv = v[x] >> 8 & 255;
+    const int32_t upper = 256 * p[0] + du * (p[right] - p[0]);
+    const int32_t lower = 256 * q[0] + du * (q[right] - q[0]);
+    const int32_t grey = (256 * upper + dv * (lower - upper) + 32768) >> 16;
+    out[x] = (uint8_t)(grey > 1 ? grey : 1);
+  }
+}
+
+#if !defined(TVK_NO_FLOATS)
 /* Comparisons of floats keep gcc from making vectors: they might trap. */
 static inline float at_least_0(float value) { return 0.5f * (value + fabsf(value)); }
 
@@ -89,9 +123,11 @@ void TVK_DENSE(fit_row)(const int32_t *sums, const int16_t *steps, const uint8_t
   const float gain_prior = model->gain_prior, excess_sq = model->excess_sq;
   const float noise_sq = model->noise_sq, step_info = model->step_info, floor_sq = model->floor_sq;
   for (int32_t x = 0; x < pitch; x += TVK_DENSE_SPAN) {
-    const int16_t *const step = steps + x;
-    const uint8_t *const same = alike + x;
-    const int8_t *const lean = slant + x;
+    /* Bytes and words apart: with them in the loop a vector of floats would be half as wide. */
+    float step[TVK_DENSE_SPAN], same[TVK_DENSE_SPAN], lean[TVK_DENSE_SPAN], likes[TVK_DENSE_SPAN];
+    for (int i = 0; i < TVK_DENSE_SPAN; ++i) step[i] = (float)steps[x + i];
+    for (int i = 0; i < TVK_DENSE_SPAN; ++i) same[i] = (float)alike[x + i];
+    for (int i = 0; i < TVK_DENSE_SPAN; ++i) lean[i] = (float)slant[x + i];
     for (int i = 0; i < TVK_DENSE_SPAN; ++i) {
       const int32_t *const s = sums + x + i;
       const int32_t a = s[0], b = s[pitch], g = s[2 * pitch], n = s[9 * pitch];
@@ -118,30 +154,17 @@ void TVK_DENSE(fit_row)(const int32_t *sums, const int16_t *steps, const uint8_t
       const float rest = moved + gain * (gain * caa - 2.0f * both);
       const float noise = at_least_0(rest) * freedom + noise_sq;
       const float info = pivot / (excess_sq * noise) + step_info;
-      const float mean = (float)lean[i] / (at_least_0((float)same[i] - 1.0f) + 1.0f);
+      const float mean = lean[i] / (at_least_0(same[i] - 1.0f) + 1.0f);
       /* Windows that would have to move by more than a step are not alike. */
       const float like = 255.0f * at_least_0(both + prior) /
                              sqrtf((at_least_0(caa) + prior) * (moved + prior) + 1e-3f) -
                          1000.0f * at_least_0(fabsf(wanted) - 1.0f);
-      parallax[x + i] = (float)step[i] + mean + change;
+      parallax[x + i] = step[i] + mean + change;
       sigma[x + i] = sqrtf(1.0f / info + floor_sq);
-      similarity[x + i] = (uint8_t)(int32_t)within(like, 1.0f, 255.0f);
+      likes[i] = within(like, 1.0f, 255.0f);
     }
+    for (int i = 0; i < TVK_DENSE_SPAN; ++i) similarity[x + i] = (uint8_t)(int32_t)likes[i];
   }
-}
-
-void TVK_DENSE(smooth_row)(const uint8_t *const *rows, int32_t width, uint8_t *restrict out) {
-  for (int32_t x = 0; x < width; x += TVK_DENSE_SPAN) {
-    const uint8_t *const a = rows[0] + x, *const b = rows[1] + x, *const c = rows[2] + x;
-    for (int i = 0; i < TVK_DENSE_SPAN; ++i) {
-      const uint16_t corners = (uint16_t)(a[i - 1] + c[i - 1] + a[i + 1] + c[i + 1]);
-      const uint16_t sides = (uint16_t)(a[i] + c[i] + b[i - 1] + b[i + 1]);
-      const uint16_t mean = (uint16_t)((uint16_t)(corners + 2 * sides + 4 * b[i] + 8) >> 4);
-      out[x + i] = (uint8_t)(b[i] == 0 ? 0 : mean > 1 ? mean : 1);
-    }
-  }
-  out[0] = rows[1][0];
-  out[width - 1] = rows[1][width - 1];
 }
 
 void TVK_DENSE(place_span)(const tvk_dense_span *span, double scale, int32_t width, int32_t height,
@@ -159,22 +182,4 @@ void TVK_DENSE(place_span)(const tvk_dense_span *span, double scale, int32_t wid
     v[i] = row;
   }
 }
-
-void TVK_DENSE(sample_span)(const uint8_t *image, int32_t width, int32_t height, int64_t stride,
-                            const int32_t *u, const int32_t *v, int32_t count, uint8_t *out) {
-  for (int32_t x = 0; x < count; ++x) {
-    if (u[x] < 0) {
-      out[x] = 0;
-      continue;
-    }
-    const int32_t column = u[x] >> 16, line = v[x] >> 16;
-    const uint8_t *p = image + line * stride + column;
-    const ptrdiff_t right = column + 1 < width ? 1 : 0;
-    const uint8_t *q = line + 1 < height ? p + stride : p;
-    const int32_t du = u[x] >> 8 & 255, dv = v[x] >> 8 & 255;
-    const int32_t upper = 256 * p[0] + du * (p[right] - p[0]);
-    const int32_t lower = 256 * q[0] + du * (q[right] - q[0]);
-    const int32_t grey = (256 * upper + dv * (lower - upper) + 32768) >> 16;
-    out[x] = (uint8_t)(grey > 1 ? grey : 1);
-  }
-}
+#endif /* TVK_NO_FLOATS */

@@ -3,25 +3,29 @@
    TVK_DENSE_LARGE to it, and the sum of three paths is at most 144. Loops run over blocks of
    TVK_DENSE_BLOCK, a number that the compiler knows, so that they become vector code. */
 
+/* One bit more behind the bits of a census: whether a is above b by more than `most`. */
+static block append(block bits, block a, block b, block most) {
+  const block above = block_less(a, block_least(a, b));
+  /* A comparison gives 255, and with one more 0, where the difference is tolerated. */
+  const block is_more = block_add(block_equal(block_least(above, most), above), block_of(1));
+  return block_add(block_add(bits, bits), is_more);
+}
+
 void TVK_DENSE(census_codes)(const uint8_t *const *rows, int32_t width, int32_t tolerance,
                              uint8_t *brighter, uint8_t *darker) {
   /* The 8 neighbours of a 3 x 3 window, and 8 at a distance of two. */
   static const int8_t pairs[8][2] = {{-1, -1}, {0, -1},  {1, -1}, {-1, 0},
                                      {-2, 0},  {-2, -2}, {0, -2}, {2, -2}};
   enum { REACH = TVK_DENSE_CENSUS_REACH };
-  const block most = block_of((uint8_t)tolerance), one = block_of(1), none = block_of(0);
+  const block most = block_of((uint8_t)tolerance), none = block_of(0);
   for (int32_t x = 0; x < width; x += TVK_DENSE_BLOCK) {
     block more = none, less = none;
     for (int n = 0; n < 8; ++n) {
       const int dx = pairs[n][0], dy = pairs[n][1];
       const block a = block_load(rows[REACH + dy] + x + dx);
-      const block b = block_load(rows[REACH - dy] + x - dx), low = block_least(a, b);
-      const block above = block_less(a, low), below = block_less(b, low);
-      /* A comparison gives 255, and with one more 0, where the difference is tolerated. */
-      const block is_more = block_add(block_equal(block_least(above, most), above), one);
-      const block is_less = block_add(block_equal(block_least(below, most), below), one);
-      more = block_add(block_add(more, more), is_more);
-      less = block_add(block_add(less, less), is_less);
+      const block b = block_load(rows[REACH - dy] + x - dx);
+      more = append(more, a, b, most);
+      less = append(less, b, a, most);
     }
     const block is_outside = block_equal(block_load(rows[REACH] + x), none);
     /* Pixels outside: all bits of `brighter`, and none of `darker`. */
@@ -58,35 +62,10 @@ static inline block follow(block cost, const uint8_t *before, block least_before
   return block_add(block_less(way, least_before), cost);
 }
 
-void TVK_DENSE(sum_down)(const tvk_dense_row *row) {
-  const int32_t count = row->num_steps, pitch = count + 2 * TVK_DENSE_PAD;
-  for (int32_t x = 0; x < row->width; ++x) {
-    uint8_t *const cost = row->costs + (ptrdiff_t)x * count;
-    uint8_t *const sum = row->sums + (ptrdiff_t)x * count;
-    const uint8_t *const before = row->before + (ptrdiff_t)x * pitch + TVK_DENSE_PAD;
-    uint8_t *const after = row->after + (ptrdiff_t)x * pitch + TVK_DENSE_PAD;
-    const block least_before = block_of(row->least[x]);
-    const block jump = block_of((uint8_t)(row->least[x] + row->large[x]));
-    const block brighter = block_of(row->brighter0[x]), darker = block_of(row->darker0[x]);
-    block least = block_of(TVK_DENSE_NEVER);
-    for (int32_t k = 0; k < count; k += TVK_DENSE_BLOCK) {
-      const block here =
-          block_add(block_bits(block_xor(brighter, block_load(row->brighter1 + x + k))),
-                    block_bits(block_xor(darker, block_load(row->darker1 + x + k))));
-      const block paid = row->grey0[x] != 0 ? here : block_of(0);
-      const block way = follow(paid, before + k, least_before, jump);
-      block_store(cost + k, paid);
-      block_store(after + k, way);
-      block_store(sum + k, way);
-      least = block_least(least, way);
-    }
-    row->least[x] = block_lowest(least);
-  }
-}
-
-/* Adds a step of a path across to the sums of a column. Returns the least cost of the path. */
-static inline uint8_t follow_line(const uint8_t *cost, const uint8_t *before, uint8_t least_before,
-                                  uint8_t large, int32_t count, uint8_t *after, uint8_t *sum) {
+/* Adds a step of a path to the sums of a column. Returns the least cost of the path. */
+static TVK_NOINLINE uint8_t follow_line(const uint8_t *cost, const uint8_t *before,
+                                        uint8_t least_before, uint8_t large, int32_t count,
+                                        uint8_t *after, uint8_t *sum) {
   const block base = block_of(least_before), jump = block_of((uint8_t)(least_before + large));
   block least = block_of(TVK_DENSE_NEVER);
   for (int32_t k = 0; k < count; k += TVK_DENSE_BLOCK) {
@@ -96,6 +75,25 @@ static inline uint8_t follow_line(const uint8_t *cost, const uint8_t *before, ui
     least = block_least(least, way);
   }
   return block_lowest(least);
+}
+
+void TVK_DENSE(sum_down)(const tvk_dense_row *row) {
+  const int32_t count = row->num_steps, pitch = count + 2 * TVK_DENSE_PAD;
+  for (int32_t x = 0; x < row->width; ++x) {
+    uint8_t *const cost = row->costs + (ptrdiff_t)x * count;
+    uint8_t *const sum = row->sums + (ptrdiff_t)x * count;
+    const uint8_t *const before = row->before + (ptrdiff_t)x * pitch + TVK_DENSE_PAD;
+    uint8_t *const after = row->after + (ptrdiff_t)x * pitch + TVK_DENSE_PAD;
+    const block brighter = block_of(row->brighter0[x]), darker = block_of(row->darker0[x]);
+    memset(sum, 0, (size_t)count);
+    memset(cost, 0, (size_t)count);
+    for (int32_t k = 0; k < count && row->grey0[x] != 0; k += TVK_DENSE_BLOCK) {
+      block_store(cost + k,
+                  block_add(block_bits(block_xor(brighter, block_load(row->brighter1 + x + k))),
+                            block_bits(block_xor(darker, block_load(row->darker1 + x + k)))));
+    }
+    row->least[x] = follow_line(cost, before, row->least[x], row->large[x], count, after, sum);
+  }
 }
 
 void TVK_DENSE(sum_across)(const tvk_dense_row *row) {
@@ -120,13 +118,42 @@ void TVK_DENSE(sum_across)(const tvk_dense_row *row) {
   }
 }
 
+static TVK_NOINLINE uint8_t lowest_of(const uint8_t *sum, int32_t count) {
+  block low = block_of(255);
+  for (int32_t k = 0; k < count; k += TVK_DENSE_BLOCK) low = block_least(low, block_load(sum + k));
+  return block_lowest(low);
+}
+
+/* The first entry of the least sum; and by how much the least sum is larger of those that are more
+   than `reach` entries away. */
+static TVK_NOINLINE int32_t choose(const uint8_t *sum, int32_t count, int32_t reach,
+                                   uint8_t *lowest, uint8_t *margin) {
+  static const uint8_t number[TVK_DENSE_BLOCK] = {0,  1,  2,  3,  4,  5,  6,  7,  8,  9,  10,
+                                                  11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21,
+                                                  22, 23, 24, 25, 26, 27, 28, 29, 30, 31};
+  const block numbers = block_load(number), span = block_of((uint8_t)(2 * reach));
+  *lowest = lowest_of(sum, count);
+  const block low = block_of(*lowest);
+  block next = block_of(255);
+  int32_t at = 0, first;
+  while ((first = block_first(block_equal(block_load(sum + at), low))) < 0) at += TVK_DENSE_BLOCK;
+  at += first;
+  for (int32_t k = 0; k < count; k += TVK_DENSE_BLOCK) {
+    /* Of the block, the entries from `begin` on, 2 reach + 1 of them, are the winner's. */
+    const int32_t begin = at - reach - k;
+    const uint8_t own = (uint8_t)(begin < -2 * reach || begin >= TVK_DENSE_BLOCK ? 128 : begin);
+    const block behind = block_less(numbers, block_of(own));
+    const block without = block_equal(block_least(behind, span), behind);
+    next = block_least(next, block_or(block_load(sum + k), without));
+  }
+  *margin = (uint8_t)(block_lowest(next) - *lowest);
+  return at;
+}
+
 void TVK_DENSE(choose_steps)(const tvk_dense_row *row, int16_t *steps, uint8_t *least,
                              uint8_t *margin, uint8_t *least1) {
   enum { STRETCHES = 8 };
   const int32_t count = row->num_steps, width = row->width;
-  uint8_t number[TVK_DENSE_BLOCK];
-  for (int i = 0; i < TVK_DENSE_BLOCK; ++i) number[i] = (uint8_t)i;
-  const block numbers = block_load(number);
   memset(least1, 255, (size_t)(width + count - 1));
   /* Columns in an order in which neighbours are far apart: what one stores in least1 the next would
      load at another alignment, and wait for. */
@@ -141,27 +168,9 @@ void TVK_DENSE(choose_steps)(const tvk_dense_row *row, int16_t *steps, uint8_t *
     }
     const uint8_t *const sum = row->sums + (ptrdiff_t)x * count;
     uint8_t *const other = least1 + x;
-    block low = block_of(255), next = low;
     for (int32_t k = 0; k < count; k += TVK_DENSE_BLOCK) {
-      const block here = block_load(sum + k);
-      low = block_least(low, here);
-      block_store(other + k, block_least(block_load(other + k), here));
+      block_store(other + k, block_least(block_load(other + k), block_load(sum + k)));
     }
-    const uint8_t lowest = block_lowest(low);
-    int32_t at = 0, first;
-    while ((first = block_first(block_equal(block_load(sum + at), block_of(lowest)))) < 0)
-      at += TVK_DENSE_BLOCK;
-    at += first;
-    for (int32_t k = 0; k < count; k += TVK_DENSE_BLOCK) {
-      /* Of the block, the entries from `begin` on, three of them, are the winner's. */
-      const int32_t begin = at - 1 - k;
-      const uint8_t own = (uint8_t)(begin < -2 || begin >= TVK_DENSE_BLOCK ? 128 : begin);
-      const block behind = block_less(numbers, block_of(own));
-      const block without = block_equal(block_least(behind, block_of(2)), behind);
-      next = block_least(next, block_or(block_load(sum + k), without));
-    }
-    steps[x] = (int16_t)at;
-    least[x] = lowest;
-    margin[x] = (uint8_t)(block_lowest(next) - lowest);
+    steps[x] = (int16_t)choose(sum, count, 1, least + x, margin + x);
   }
 }
