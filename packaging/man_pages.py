@@ -18,7 +18,7 @@ import sys
 
 LEFT_OUT = ("Where it is",)  # sections about the source tree
 # Their --help needs packages that a build may not have.
-PYTHON_VERBS = ("compare", "colmap", "rerun")
+PYTHON_VERBS = ("compare", "colmap", "import", "export", "rerun")
 
 
 def run_help(program, words):

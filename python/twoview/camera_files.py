@@ -17,8 +17,9 @@ import re
 import warnings
 from typing import Any, Callable, Mapping, NamedTuple, Optional, Sequence, Union
 
-from ._camera_entries import (COEFFICIENTS, NUM_MODELLED, Entries, checked_camera, is_camera,
-                              number_of, plain, refuse, side_of, sigmas_of, take_camera, word_of)
+from ._camera_entries import (COEFFICIENTS, FISHEYE_COEFFICIENTS, NUM_MODELLED, Entries,
+                              checked_camera, is_camera, number_of, plain, refuse, side_of,
+                              sigmas_of, take_camera, word_of)
 from ._camera_entries import FormatError as FormatError
 from ._camera_entries import parse_number as parse_number
 from .camera import Camera, camera_check
@@ -628,11 +629,12 @@ def _first(values: list[float]) -> int:
 
 def _camera_set(name: str, camera: Camera, sigmas: Optional[CalibrationSigmas]) -> str:
     k = _padded(camera)
-    if _is_fisheye(camera) or any(k[5:]):
-        raise ValueError(f"{name}: a cameras.yaml has k1 k2 p1 p2 k3 and no other lens")
-    entries = zip(("fx", "fy", "cx", "cy", *COEFFICIENTS[:5]),
-                  (camera.fx, camera.fy, camera.cx, camera.cy, *k[:5]))
+    num = 4 if _is_fisheye(camera) else 8 if any(k[5:]) else 5
+    names = (FISHEYE_COEFFICIENTS if _is_fisheye(camera) else COEFFICIENTS)[:num]
+    entries = zip(("fx", "fy", "cx", "cy", *names),
+                  (camera.fx, camera.fy, camera.cx, camera.cy, *k[:num]))
     return (f"{_quoted(name)}:\n  image_width: {camera.width}\n  image_height: {camera.height}\n"
+            + ("  distortion_model: equidistant\n" if _is_fisheye(camera) else "")
             + "".join(f"  {entry}: {_digits(value)}\n" for entry, value in entries))
 
 

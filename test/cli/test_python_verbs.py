@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Tests of twoview compare and twoview colmap: how twoview starts the Python programs, from the
-source tree and installed."""
+"""Tests of the verbs that are Python programs: how twoview starts them, from the source tree and
+installed."""
 import json
 import os
 import pathlib
@@ -31,7 +31,7 @@ class HandOver(cli.CliTest):
         self.tree = self.folder / "a tree"
         tools = self.tree / "tools" / "compare_colmap"
         tools.mkdir(parents=True)
-        for script in ("compare_colmap", "twoview_colmap", "twoview_rerun"):
+        for script in ("compare_colmap", "twoview_colmap", "twoview_bags", "twoview_rerun"):
             (tools / script).write_text(SCRIPT)
         bin_dir, lib_dir = self.tree / "build" / "x" / "bin", self.tree / "build" / "x" / "lib"
         bin_dir.mkdir(parents=True)
@@ -52,7 +52,7 @@ class HandOver(cli.CliTest):
         return json.loads(done.stdout)
 
     def test_all_get_the_arguments_and_this_library_and_their_status_comes_back(self):
-        for verb in ("compare", "colmap", "rerun"):
+        for verb in ("compare", "colmap", "import", "export", "rerun"):
             got = self.report(self.start(verb, "--help", "a b", "", TWOVIEW_PYTHON=sys.executable))
             self.assertEqual(got["argv"], ["--help", "a b", ""])
             self.assertEqual((got["library"], got["blocked"]), (self.library, []))
@@ -105,7 +105,8 @@ class HandOver(cli.CliTest):
 
     def test_help_lists_them(self):
         listed = self.start("--help").stdout.decode()
-        self.assertRegex(listed, r"\n  compare  .*\n  colmap  .*\n  rerun  ")
+        self.assertRegex(listed, "".join(
+            rf"\n  {verb}  .*" for verb in ("compare", "colmap", "import", "export", "rerun")))
 
     def test_compare_has_its_help_without_packages_and_under_its_own_name(self):
         root = Path(__file__).resolve().parents[2]

@@ -157,9 +157,9 @@ class TestPages(unittest.TestCase):
                     if verb not in verbs:
                         wrong.append(f"{page}:{first}: twoview {verb}")
                         continue
-                    if verb in ("compare", "colmap", "rerun"):
+                    if verb in ("compare", "colmap", "import", "export", "rerun"):
                         # These verbs are Python programs. The tests python/compare_*,
-                        # python/colmap_* and cli/rerun run their commands.
+                        # python/colmap_*, cli/bags and cli/rerun run their commands.
                         continue
                     path = [verb] + (
                         [rest[0]]

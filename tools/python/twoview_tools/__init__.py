@@ -4,6 +4,7 @@
 - accuracy: the accuracy tables (scripts/accuracy), the verdict and covariance against true poses
   (scripts/belief), and what measures them.
 - compare: twoview beside COLMAP, OpenGV, OpenCV and PoseLib (tools/compare_colmap/compare_colmap).
+- bags: bags of ROS 1, ROS 2 and MCAP, in and out (tools/compare_colmap/twoview_bags).
 - colmap: COLMAP databases and models, in and out (tools/compare_colmap/twoview_colmap).
 - paper: the paper's figures and tables (scripts/paper).
 - to_rerun: results and recordings for Rerun's viewer (tools/compare_colmap/twoview_rerun).
@@ -28,18 +29,22 @@ FOLDERS = [str(folder) for folder in (PARENT, ROOT / "python")
            if folder == PARENT or (folder / "twoview" / "__init__.py").is_file()]
 # The library of the release build; TWOVIEW_LIBRARY overrides it.
 DEFAULT_LIBRARY = str(ROOT / "build" / "release" / "lib" / "libtwoview.so")
-# Modules that compare and colmap import, and what installs them: a package of Debian, or None, and
-# one of PyPI.
+# Modules that compare, colmap, import and export need, and what installs them: a package of Debian,
+# or None, and one of PyPI.
 PACKAGES = {
     "cv2": ("python3-opencv", "opencv-python-headless"),
     "jinja2": ("python3-jinja2", "jinja2"),
+    "lz4": ("python3-lz4", "lz4"),
+    "mcap": (None, "mcap"),
     "numpy": ("python3-numpy", "numpy"),
     "plotly": ("python3-plotly", "plotly"),
     "scipy": ("python3-scipy", "scipy"),
     "pycolmap": (None, "pycolmap"),
+    "rosbags": (None, "rosbags"),
     "tqdm": ("python3-tqdm", "tqdm"),
     "twoview": ("python3-twoview", "twoview"),
     "yaml": ("python3-yaml", "pyyaml"),
+    "zstandard": ("python3-zstandard", "zstandard"),
 }
 
 

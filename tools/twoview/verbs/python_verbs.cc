@@ -24,6 +24,8 @@ struct PythonVerb {
 constexpr PythonVerb kVerbs[] = {
     {"compare", "compare_colmap", "the same pairs beside COLMAP, OpenGV, OpenCV and PoseLib"},
     {"colmap", "twoview_colmap", "COLMAP databases and models, in and out"},
+    {"import", "twoview_bags", "a bag of ROS 1, ROS 2 or MCAP as a folder for odometry"},
+    {"export", "twoview_bags", "path and map of odometry as a bag of ROS 1, ROS 2 or MCAP"},
     {"rerun", "twoview_rerun", "a result or a recording as a file for Rerun's viewer"},
 };
 

@@ -1,5 +1,5 @@
-// The verbs that are Python programs: compare, colmap and rerun. They are found in the source tree,
-// or below share/twoview in an installation.
+// The verbs that are Python programs: compare, colmap, import, export and rerun. They are found in
+// the source tree, or below share/twoview in an installation.
 #pragma once
 
 #include <CLI/App.hpp>
