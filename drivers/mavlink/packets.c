@@ -85,6 +85,23 @@ static int take_sequence(tvm_session *s, const mavlink_message_t *m) {
   return 1;
 }
 
+/* Answers the autopilot's request with its own clock: it then finds an offset of 0 to the times
+   that estimates state, which are of that clock already. */
+static void answer_timesync(tvm_session *s, int64_t asked_ns) {
+  mavlink_message_t m;
+  mavlink_timesync_t sync;
+  int64_t uncertainty_ns;
+  uint8_t bytes[MAVLINK_MAX_PACKET_LEN];
+  if (!s->sends_estimates || s->options.listen_only || !tvm_has_clock(s)) return;
+  memset(&sync, 0, sizeof sync);
+  sync.tc1 = s->now_ns - tvm_shift(s, &uncertainty_ns);
+  sync.ts1 = asked_ns;
+  if (sync.tc1 <= 0) return;
+  mavlink_msg_timesync_encode_status(tvm_own_system(s), (uint8_t)s->options.own_component,
+                                     &s->sender, &m, &sync);
+  tvm_send_packet(s, bytes, mavlink_msg_to_send_buffer(bytes, &m));
+}
+
 static void take_packet(tvm_session *s, const mavlink_message_t *m) {
   mavlink_timesync_t sync;
   int k;
@@ -111,6 +128,7 @@ static void take_packet(tvm_session *s, const mavlink_message_t *m) {
   for (k = 0; k < NUM_WANTED; ++k) s->requests[k].num_seen += m->msgid == s->requests[k].id;
   if (m->msgid == MAVLINK_MSG_ID_TIMESYNC) {
     mavlink_msg_timesync_decode(m, &sync);
+    if (sync.tc1 == 0) answer_timesync(s, sync.ts1);
     for (k = 0; k < NUM_SENT_TIMES; ++k) {
       if (sync.tc1 == 0 || sync.ts1 == 0 || sync.ts1 != s->sent_ns[k]) continue;
       s->sent_ns[k] = 0;
@@ -148,22 +166,26 @@ void tvm_receive(tvm_session *s, const uint8_t *bytes, size_t size) {
   }
 }
 
-/* ---- sending: HEARTBEAT, TIMESYNC and requests for rates; nothing else ---- */
+/* ---- sending: HEARTBEAT, TIMESYNC and requests for rates; what visual odometry tells is in
+   send_track.c; nothing else ---- */
 
-static uint8_t own_system(const tvm_session *s) {
+uint8_t tvm_own_system(const tvm_session *s) {
   if (s->options.own_system) return (uint8_t)s->options.own_system;
   return (uint8_t)(s->vehicle                  ? s->vehicle
                    : s->options.vehicle_system ? s->options.vehicle_system
                                                : 1);
 }
 
-static int send_message(tvm_session *s, const mavlink_message_t *m) {
-  uint8_t bytes[MAVLINK_MAX_PACKET_LEN];
-  const size_t size = mavlink_msg_to_send_buffer(bytes, m);
+int tvm_send_packet(tvm_session *s, const uint8_t *bytes, size_t size) {
   if (s->transport.send(s->transport.user, bytes, size) != TVS_OK) return 0;
   if (s->options.on_packet && s->vehicle)
     s->options.on_packet(s->options.user, s->now_ns, bytes, size);
   return 1;
+}
+
+static int send_message(tvm_session *s, const mavlink_message_t *m) {
+  uint8_t bytes[MAVLINK_MAX_PACKET_LEN];
+  return tvm_send_packet(s, bytes, mavlink_msg_to_send_buffer(bytes, m));
 }
 
 static void send_heartbeat(tvm_session *s) {
@@ -175,8 +197,8 @@ static void send_heartbeat(tvm_session *s) {
   heartbeat.autopilot = MAV_AUTOPILOT_INVALID;
   heartbeat.system_status = MAV_STATE_ACTIVE;
   heartbeat.mavlink_version = 3;
-  mavlink_msg_heartbeat_encode_status(own_system(s), (uint8_t)s->options.own_component, &s->sender,
-                                      &m, &heartbeat);
+  mavlink_msg_heartbeat_encode_status(tvm_own_system(s), (uint8_t)s->options.own_component,
+                                      &s->sender, &m, &heartbeat);
   send_message(s, &m);
 }
 
@@ -185,8 +207,8 @@ static void send_timesync(tvm_session *s) {
   mavlink_timesync_t sync;
   memset(&sync, 0, sizeof sync);
   sync.ts1 = s->now_ns;
-  mavlink_msg_timesync_encode_status(own_system(s), (uint8_t)s->options.own_component, &s->sender,
-                                     &m, &sync);
+  mavlink_msg_timesync_encode_status(tvm_own_system(s), (uint8_t)s->options.own_component,
+                                     &s->sender, &m, &sync);
   if (!send_message(s, &m)) return;
   s->sent_ns[s->idx_sent] = s->now_ns;
   s->idx_sent = (s->idx_sent + 1) % NUM_SENT_TIMES;
@@ -201,7 +223,7 @@ static void send_interval(tvm_session *s, const wanted *w) {
   command.command = MAV_CMD_SET_MESSAGE_INTERVAL;
   command.param1 = (float)w->id;
   command.param2 = (float)(1e6 / w->hz);
-  mavlink_msg_command_long_encode_status(own_system(s), (uint8_t)s->options.own_component,
+  mavlink_msg_command_long_encode_status(tvm_own_system(s), (uint8_t)s->options.own_component,
                                          &s->sender, &m, &command);
   send_message(s, &m);
 }
@@ -216,8 +238,8 @@ static void send_stream(tvm_session *s, uint8_t stream, double hz) {
   request.req_stream_id = stream;
   request.req_message_rate = (uint16_t)ceil(hz);
   request.start_stop = 1;
-  mavlink_msg_request_data_stream_encode_status(own_system(s), (uint8_t)s->options.own_component,
-                                                &s->sender, &m, &request);
+  mavlink_msg_request_data_stream_encode_status(
+      tvm_own_system(s), (uint8_t)s->options.own_component, &s->sender, &m, &request);
   send_message(s, &m);
 }
 

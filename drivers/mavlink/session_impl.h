@@ -1,6 +1,6 @@
 /* What the parts of a session share. session.c: life, step, queries, frames. packets.c: bytes to
    messages, sequence numbers, what is sent. samples.c: messages to samples, and the vehicle's
-   clock. */
+   clock. send_track.c: estimates of visual odometry as packets. */
 #ifndef TVM_SESSION_IMPL_H
 #define TVM_SESSION_IMPL_H
 
@@ -60,6 +60,7 @@ struct tvm_session {
   int64_t heartbeat_due_ns, timesync_due_ns, requests_due_ns;
   int64_t sent_ns[NUM_SENT_TIMES];
   int idx_sent;
+  int sends_estimates; /* the autopilot's TIMESYNC is answered */
 
   /* the vehicle's clock */
   tvs_clock clock;
@@ -94,6 +95,10 @@ struct tvm_session {
 
 /* packets.c */
 void tvm_receive(tvm_session *session, const uint8_t *bytes, size_t size);
+/* The system id to send with. */
+uint8_t tvm_own_system(const tvm_session *session);
+/* Sends a packet; returns 1 if the transport took it. */
+int tvm_send_packet(tvm_session *session, const uint8_t *bytes, size_t size);
 void tvm_send_due(tvm_session *session);
 
 /* samples.c */

@@ -2,8 +2,9 @@
 
    The session reads ATTITUDE, LOCAL_POSITION_NED, ALTITUDE and DISTANCE_SENSOR and gives them as
    samples of source.h; with a camera of your own it gives frames with their attitudes. It sends
-   HEARTBEAT as an onboard computer, TIMESYNC, and requests for the rates of these messages. It has
-   no function that arms, steers or moves the vehicle, and never sends a message that does.
+   HEARTBEAT as an onboard computer, TIMESYNC, and requests for the rates of these messages; with
+   mavlink/estimate.h also what visual odometry knows of the pose. It has no function that arms,
+   steers or moves the vehicle, and never sends a message that does.
 
    Frames and signs: docs/mavlink.md derives them. MAVLink's library packs and parses the packets;
    this header does not include it. */

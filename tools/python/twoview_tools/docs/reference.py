@@ -34,6 +34,7 @@ DRIVERS = [
     "h264",
     "status",
     "mavlink/session",
+    "mavlink/estimate",
     "mavlink/udp",
     "ardrone/session",
     "ardrone/sockets",

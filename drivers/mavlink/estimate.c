@@ -1,0 +1,393 @@
+/* What visual odometry says of a frame, as an estimate of the body's pose and motion.
+
+   tv_odometry_state.covariance is that of (w, d) with x_true = exp([w]x) x + d for a point x of the
+   camera, so the camera's place errs by -R d and its attitude by the turn -R w about the world's
+   axes, R = world_from_cam. */
+#include "twoview_drivers/mavlink/estimate.h"
+
+#include <math.h>
+#include <string.h>
+
+static const int64_t MOST_STEP_NS = INT64_C(500000000); /* between frames that give a velocity */
+/* The acceleration of a vehicle of which one velocity alone is known, m/s^2 and rad/s^2. */
+static const double ACCELERATION = 5.0;
+/* Where the quality is 50: what PX4 (EKF2_EVP_NOISE) and ArduPilot (VISO_POS_M_NSE, 0.2) take for
+   the noise of such a position. */
+static const double HALF_QUALITY_M = 0.1;
+enum { WEAK_QUALITY = 20 };
+/* A correction of a pose without a covariance that counts as a reset: metres, radians. */
+static const double LEAST_JUMP_M = 0.05, LEAST_JUMP_RAD = 0.01;
+/* The cosine of the pitch below which roll and yaw cannot be told apart. */
+static const double LEAST_COS_PITCH = 0.05;
+
+/* ---- 3 x 3 and 6 x 6, row-major ---- */
+
+static void multiply(const double *a, const double *b, double *out) {
+  int i, j, k;
+  for (i = 0; i < 3; ++i) {
+    for (j = 0; j < 3; ++j) {
+      double sum = 0;
+      for (k = 0; k < 3; ++k) sum += a[3 * i + k] * b[3 * k + j];
+      out[3 * i + j] = sum;
+    }
+  }
+}
+
+static void transpose(const double *a, double *out) {
+  int i, j;
+  for (i = 0; i < 3; ++i)
+    for (j = 0; j < 3; ++j) out[3 * j + i] = a[3 * i + j];
+}
+
+static void apply(const double *a, const double *v, double *out) {
+  int i;
+  for (i = 0; i < 3; ++i) out[i] = a[3 * i] * v[0] + a[3 * i + 1] * v[1] + a[3 * i + 2] * v[2];
+}
+
+static void cross_matrix(const double *v, double *out) {
+  const double m[9] = {0, -v[2], v[1], v[2], 0, -v[0], -v[1], v[0], 0};
+  memcpy(out, m, sizeof m);
+}
+
+static double length_sq(const double *v) { return v[0] * v[0] + v[1] * v[1] + v[2] * v[2]; }
+
+/* out = J C J^T, and symmetric to the last bit. */
+static void propagate(const double *J, const double *C, double *out) {
+  double JC[36];
+  int i, j, k;
+  for (i = 0; i < 6; ++i) {
+    for (j = 0; j < 6; ++j) {
+      double sum = 0;
+      for (k = 0; k < 6; ++k) sum += J[6 * i + k] * C[6 * k + j];
+      JC[6 * i + j] = sum;
+    }
+  }
+  for (i = 0; i < 6; ++i) {
+    for (j = i; j < 6; ++j) {
+      double sum = 0;
+      for (k = 0; k < 6; ++k) sum += JC[6 * i + k] * J[6 * j + k];
+      out[6 * i + j] = out[6 * j + i] = sum;
+    }
+  }
+}
+
+/* Puts a 3 x 3 block, times `factor`, into a 6 x 6 matrix. */
+static void put_block(double *J, int row, int column, const double *block, double factor) {
+  int i, j;
+  for (i = 0; i < 3; ++i)
+    for (j = 0; j < 3; ++j) J[6 * (row + i) + column + j] = factor * block[3 * i + j];
+}
+
+static void quaternion_of(const double *R, double *q) {
+  /* The largest component by a root, the others by division (Shepperd, 1978). */
+  const double trace = R[0] + R[4] + R[8];
+  const double squares[4] = {1 + trace, 1 + 2 * R[0] - trace, 1 + 2 * R[4] - trace,
+                             1 + 2 * R[8] - trace};
+  double length;
+  int best = 0, k;
+  for (k = 1; k < 4; ++k)
+    if (squares[k] > squares[best]) best = k;
+  switch (best) {
+    case 0: q[0] = squares[0], q[1] = R[7] - R[5], q[2] = R[2] - R[6], q[3] = R[3] - R[1]; break;
+    case 1: q[0] = R[7] - R[5], q[1] = squares[1], q[2] = R[1] + R[3], q[3] = R[2] + R[6]; break;
+    case 2: q[0] = R[2] - R[6], q[1] = R[1] + R[3], q[2] = squares[2], q[3] = R[5] + R[7]; break;
+    default: q[0] = R[3] - R[1], q[1] = R[2] + R[6], q[2] = R[5] + R[7], q[3] = squares[3]; break;
+  }
+  length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+  if (q[0] < 0) length = -length;
+  for (k = 0; k < 4; ++k) q[k] /= length;
+}
+
+/* The rotation vector of R. */
+static void logarithm(const double *R, double *w) {
+  double q[4], sine, factor;
+  int k;
+  quaternion_of(R, q);
+  sine = sqrt(length_sq(q + 1));
+  factor = sine > 1e-9 ? 2 * atan2(sine, q[0]) / sine : 2;
+  for (k = 0; k < 3; ++k) w[k] = factor * q[1 + k];
+}
+
+static int is_rotation(const double *R) {
+  double Rt[9], product[9], determinant;
+  int k;
+  transpose(R, Rt);
+  multiply(R, Rt, product);
+  for (k = 0; k < 9; ++k)
+    if (!(fabs(product[k] - (k % 4 == 0)) < 1e-6)) return 0;
+  determinant = R[0] * (R[4] * R[8] - R[5] * R[7]) - R[1] * (R[3] * R[8] - R[5] * R[6]) +
+                R[2] * (R[3] * R[7] - R[4] * R[6]);
+  return determinant > 0;
+}
+
+/* ---- options ---- */
+
+void tvm_estimator_options_init(tvm_estimator_options *options) {
+  static const double ahead[9] = {0, 0, 1, 1, 0, 0, 0, 1, 0};
+  if (!options) return;
+  memset(options, 0, sizeof *options);
+  options->struct_size = sizeof *options;
+  options->messages = TVM_SEND_ODOMETRY;
+  options->weak_factor = 3;
+  memcpy(options->body_from_camera, ahead, sizeof ahead);
+}
+
+tvs_status tvm_estimator_init(tvm_estimator *estimator, const tvm_estimator_options *options) {
+  if (!estimator || !options) return TVS_ERR_NULL;
+  if (options->struct_size != sizeof *options) return TVS_ERR_STRUCT_SIZE;
+  if (options->messages < 1 || options->messages > 3 || options->weak < TVM_WEAK_SILENT ||
+      options->weak > TVM_WEAK_GROWN || options->world < TVM_WORLD_FRD ||
+      options->world > TVM_WORLD_NED ||
+      !(options->weak_factor >= 1 && options->weak_factor <= 100) ||
+      !is_rotation(options->body_from_camera) || !(length_sq(options->camera_in_body) < 1e6)) {
+    return TVS_ERR_ARGUMENT;
+  }
+  memset(estimator, 0, sizeof *estimator);
+  estimator->options = *options;
+  estimator->last_segment = -1;
+  estimator->last_ns = estimator->told_ns = INT64_MIN;
+  return TVS_OK;
+}
+
+/* ---- one frame ---- */
+
+static tvm_silence silence_of(const tvm_estimator *e, const tvm_track *track) {
+  const tv_odometry_state *s = track->state;
+  if (s->status == TV_ODOMETRY_STARTING) return TVM_SILENCE_STARTING;
+  if (s->status == TV_ODOMETRY_ROTATION) return TVM_SILENCE_ROTATION;
+  if (s->status == TV_ODOMETRY_LOST || !s->has_pose) return TVM_SILENCE_LOST;
+  if (s->scale_source == TV_SCALE_UNIT) return TVM_SILENCE_SCALE;
+  if (!track->is_upright) return TVM_SILENCE_ATTITUDE;
+  if (s->status == TV_ODOMETRY_WEAK && e->options.weak == TVM_WEAK_SILENT) return TVM_SILENCE_WEAK;
+  return TVM_SILENCE_NONE;
+}
+
+/* Whether the map's adjustment has moved the last frame by more than its own standard deviation. */
+static int was_corrected(const tvm_estimator *e, const tvm_track *track) {
+  double moved[3], Rt[9], turn[9], w[3], position_sq = LEAST_JUMP_M * LEAST_JUMP_M,
+                                         angle_sq = LEAST_JUMP_RAD * LEAST_JUMP_RAD;
+  const double *C = e->last_covariance;
+  int k;
+  if (!track->has_previous || !e->has_last) return 0;
+  for (k = 0; k < 3; ++k) moved[k] = track->previous_t[k] - e->last_t[k];
+  transpose(e->last_R, Rt);
+  multiply(Rt, track->previous_R, turn);
+  logarithm(turn, w);
+  if (e->has_last_covariance) {
+    angle_sq = C[0] + C[7] + C[14];
+    position_sq = C[21] + C[28] + C[35];
+  }
+  return length_sq(moved) > position_sq || length_sq(w) > angle_sq;
+}
+
+/* Counts what makes a pose jump. */
+static void count_resets(tvm_estimator *e, const tvm_track *track) {
+  const tv_odometry_state *s = track->state;
+  const int is_metric = s->scale_source != TV_SCALE_UNIT;
+  const int jumps =
+      s->relocated || s->loop_closed ||
+      (e->last_segment >= 0 && (s->segment != e->last_segment || is_metric != e->was_metric));
+  if (jumps || was_corrected(e, track)) e->reset_counter = (e->reset_counter + 1) & 255;
+  /* The way since the last frame is then not one of the vehicle. */
+  if (jumps) e->has_last = 0;
+  e->last_segment = s->segment;
+  e->was_metric = is_metric;
+}
+
+/* The body's pose (R, p) in the map of a camera's pose. */
+static void body_pose(const tvm_estimator *e, const double *R_camera, const double *t, double *R,
+                      double *p) {
+  double camera_from_body[9], arm[3];
+  int k;
+  transpose(e->options.body_from_camera, camera_from_body);
+  multiply(R_camera, camera_from_body, R);
+  apply(R, e->options.camera_in_body, arm);
+  for (k = 0; k < 3; ++k) p[k] = t[k] - arm[k];
+}
+
+/* The covariance of the body's place and of its turn about the world's axes: dp = -R d + arm x w,
+   dtheta = -R w, where arm is the camera's place in the body along the world's axes. */
+static void body_covariance(const tvm_estimator *e, const double *R_camera, const double *R_body,
+                            const double *covariance, double *out) {
+  double J[36] = {0}, arm[3], arm_cross[9], lever[9];
+  apply(R_body, e->options.camera_in_body, arm);
+  cross_matrix(arm, arm_cross);
+  multiply(arm_cross, R_camera, lever);
+  put_block(J, 0, 0, lever, -1);
+  put_block(J, 0, 3, R_camera, -1);
+  put_block(J, 3, 0, R_camera, -1);
+  propagate(J, covariance, out);
+}
+
+/* Turns about the world's axes into those of roll, pitch and yaw. Returns 0 near a pitch of 90
+   degrees. */
+static int to_euler(const double *R, const double *covariance, double *out) {
+  const double sine = -R[6], cosine = sqrt(R[0] * R[0] + R[3] * R[3]);
+  double J[36] = {0}, E[9];
+  static const double one[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  double cy, sy;
+  if (cosine < LEAST_COS_PITCH) return 0;
+  cy = R[0] / cosine;
+  sy = R[3] / cosine;
+  E[0] = cy / cosine, E[1] = sy / cosine, E[2] = 0;
+  E[3] = -sy, E[4] = cy, E[5] = 0;
+  E[6] = cy * sine / cosine, E[7] = sy * sine / cosine, E[8] = 1;
+  put_block(J, 0, 0, one, 1);
+  put_block(J, 3, 3, E, 1);
+  propagate(J, covariance, out);
+  return 1;
+}
+
+/* Turns a vector of the map about the vertical. */
+static void turn_to_north(double cosine, double sine, double *v) {
+  const double x = cosine * v[0] - sine * v[1], y = sine * v[0] + cosine * v[1];
+  v[0] = x;
+  v[1] = y;
+}
+
+static int quality_of(const tvm_estimate *estimate, int is_weak) {
+  double largest = 0, quality;
+  int k;
+  if (!estimate->has_covariance) return 0;
+  for (k = 0; k < 3; ++k) largest = fmax(largest, estimate->pose_covariance[7 * k]);
+  quality = floor(100 / (1 + largest / (HALF_QUALITY_M * HALF_QUALITY_M)) + 0.5);
+  if (is_weak && quality > WEAK_QUALITY) quality = WEAK_QUALITY;
+  return quality < 1 ? 1 : (int)quality;
+}
+
+/* The share of a metre that errs in the covariance of a length v. */
+static void add_scale(double sigma, const double *v, double *covariance) {
+  int i, j;
+  for (i = 0; i < 3; ++i)
+    for (j = 0; j < 3; ++j) covariance[6 * i + j] += sigma * sigma * v[i] * v[j];
+}
+
+/* Velocity and rate by the difference to the last pose; `now` and `last` are the covariances of the
+   body's place and turn. Their change since the last difference is what the acceleration may have
+   changed within half of the step. */
+static void add_velocity(tvm_estimator *e, const tvm_track *track, const double *R, const double *p,
+                         const double *now, const double *last_R, const double *last_p,
+                         const double *last, tvm_estimate *out) {
+  const double dt = (double)(track->host_ns - e->last_ns) * 1e-9;
+  double body_from_world[9], last_from_world[9], turn[9], v[3], w[3], rate[3], cross[9], by_turn[9];
+  double J[36] = {0}, sum[36], shares[36];
+  double change_v = ACCELERATION * ACCELERATION * dt * dt, change_w = change_v;
+  int k;
+  for (k = 0; k < 3; ++k) v[k] = (p[k] - last_p[k]) / dt;
+  transpose(R, body_from_world);
+  transpose(last_R, last_from_world);
+  multiply(last_from_world, R, turn);
+  logarithm(turn, w);
+  for (k = 0; k < 3; ++k) out->rate_rad_s[k] = w[k] / dt;
+  apply(body_from_world, v, out->velocity_m_s);
+  apply(R, out->rate_rad_s, rate);
+  if (e->has_velocity) {
+    double dv[3], dw[3];
+    for (k = 0; k < 3; ++k) {
+      dv[k] = v[k] - e->last_velocity[k];
+      dw[k] = rate[k] - e->last_rate[k];
+    }
+    change_v = length_sq(dv);
+    change_w = length_sq(dw);
+  }
+  if (out->has_covariance) {
+    for (k = 0; k < 36; ++k) sum[k] = (now[k] + last[k]) / (dt * dt);
+    put_block(J, 0, 0, body_from_world, 1);
+    put_block(J, 3, 3, body_from_world, 1);
+    propagate(J, sum, out->velocity_covariance);
+    /* The velocity is turned into the body by an attitude that errs, too. */
+    memset(J, 0, sizeof J);
+    cross_matrix(out->velocity_m_s, cross);
+    multiply(cross, body_from_world, by_turn);
+    put_block(J, 0, 3, by_turn, 1);
+    propagate(J, now, shares);
+    for (k = 0; k < 36; ++k) out->velocity_covariance[k] += shares[k];
+    add_scale(track->state->scale_sigma, out->velocity_m_s, out->velocity_covariance);
+    for (k = 0; k < 3; ++k) {
+      out->velocity_covariance[7 * k] += change_v / 4;
+      out->velocity_covariance[7 * (k + 3)] += change_w / 4;
+    }
+  }
+  memcpy(e->last_velocity, v, sizeof v);
+  memcpy(e->last_rate, rate, sizeof rate);
+  e->has_velocity = 1;
+}
+
+static void keep_pose(tvm_estimator *e, const tvm_track *track) {
+  const tv_odometry_state *s = track->state;
+  memcpy(e->last_R, s->world_from_cam_R, sizeof e->last_R);
+  memcpy(e->last_t, s->world_from_cam_t, sizeof e->last_t);
+  memcpy(e->last_covariance, s->covariance, sizeof e->last_covariance);
+  e->has_last_covariance = s->has_covariance;
+  e->has_last = 1;
+}
+
+/* The estimate of a frame with a pose in metres, upright. */
+static void estimate_of(tvm_estimator *e, const tvm_track *track, tvm_estimate *out) {
+  const tv_odometry_state *s = track->state;
+  const int is_weak = s->status == TV_ODOMETRY_WEAK;
+  double R[9], p[3], last_R[9], last_p[3], now[36] = {0}, last[36] = {0};
+  int k;
+  body_pose(e, s->world_from_cam_R, s->world_from_cam_t, R, p);
+  body_pose(e, track->has_previous ? track->previous_R : e->last_R,
+            track->has_previous ? track->previous_t : e->last_t, last_R, last_p);
+  out->has_covariance = s->has_covariance && e->has_last_covariance;
+  if (out->has_covariance) {
+    body_covariance(e, s->world_from_cam_R, R, s->covariance, now);
+    body_covariance(e, e->last_R, last_R, e->last_covariance, last);
+  }
+  add_velocity(e, track, R, p, now, last_R, last_p, last, out);
+  /* A metre that errs moves all places away from the map's origin together. */
+  add_scale(s->scale_sigma, p, now);
+  if (e->options.world == TVM_WORLD_NED) {
+    const double c = cos(track->heading_rad), n = sin(track->heading_rad);
+    const double about_z[9] = {c, -n, 0, n, c, 0, 0, 0, 1};
+    double J[36] = {0}, turned[36], before[9];
+    put_block(J, 0, 0, about_z, 1);
+    put_block(J, 3, 3, about_z, 1);
+    propagate(J, now, turned);
+    memcpy(now, turned, sizeof now);
+    memcpy(before, R, sizeof before);
+    multiply(about_z, before, R);
+    turn_to_north(c, n, p);
+  }
+  if (out->has_covariance) out->has_covariance = to_euler(R, now, out->pose_covariance);
+  if (is_weak) {
+    for (k = 0; k < 36; ++k) {
+      out->pose_covariance[k] *= e->options.weak_factor * e->options.weak_factor;
+      out->velocity_covariance[k] *= e->options.weak_factor * e->options.weak_factor;
+    }
+  }
+  memcpy(out->position_m, p, sizeof p);
+  quaternion_of(R, out->world_from_body);
+  out->quality = quality_of(out, is_weak);
+  out->world = e->options.world;
+  out->time_us = track->time_us;
+}
+
+tvs_status tvm_estimator_update(tvm_estimator *e, const tvm_track *track, tvm_estimate *estimate) {
+  tvm_silence silence;
+  if (!e || !track || !estimate || !track->state) return TVS_ERR_NULL;
+  if (track->struct_size != sizeof *track || estimate->struct_size != sizeof *estimate ||
+      track->state->struct_size < sizeof *track->state) {
+    return TVS_ERR_STRUCT_SIZE;
+  }
+  if (track->host_ns <= e->last_ns) return TVS_ERR_ARGUMENT;
+  memset(estimate, 0, sizeof *estimate);
+  estimate->struct_size = sizeof *estimate;
+  if (track->state->has_pose) count_resets(e, track);
+  silence = silence_of(e, track);
+  if (silence == TVM_SILENCE_NONE || silence == TVM_SILENCE_WEAK) {
+    if (e->has_last && track->host_ns - e->last_ns > MOST_STEP_NS) e->has_last = 0;
+    if (!e->has_last) e->has_velocity = 0;
+    if (!e->has_last && silence == TVM_SILENCE_NONE) silence = TVM_SILENCE_VELOCITY;
+    if (silence == TVM_SILENCE_NONE) estimate_of(e, track, estimate);
+    keep_pose(e, track);
+  } else {
+    e->has_last = e->has_velocity = 0;
+  }
+  e->last_ns = track->host_ns;
+  estimate->silence = silence;
+  estimate->reset_counter = e->reset_counter;
+  return TVS_OK;
+}
