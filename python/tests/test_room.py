@@ -40,6 +40,21 @@ def test_a_wall_is_where_it_is_and_has_its_colour():
         assert 0.4 * len(mesh.vertices) < len(half.vertices) < 0.7 * len(mesh.vertices)
 
 
+def test_a_mesh_is_drawn_to_planes_and_left_out_by_sigma():
+    wave = 0.015 * (np.indices((72, 96)) // 12 % 2).sum(0).astype(np.float32)
+    with tv.Room(4 << 20) as room:
+        room.add(CAMERA, np.eye(3), [0.0, 0.0, 0.0], wall() + wave,
+                 np.full((72, 96), 0.03, np.float32))
+        planes = room.find_planes()
+        away = [np.std(mesh.vertices["position"][:, 2]) for mesh in
+                (room.mesh(), room.mesh(planes=planes[:1]), room.mesh(planes=planes[:0]))]
+        assert away[1] < 0.5 * away[0] and away[2] == away[0]
+        assert room.mesh(planes=planes[:1]).vertices["sigma"].max() <= 0.03 / 3
+        assert len(room.mesh(max_sigma=0.01).vertices) == 0
+        with pytest.raises(TypeError):
+            room.mesh(planes=[1.0])
+
+
 def test_a_map_is_removed_as_exactly_as_it_was_added():
     with tv.Room(4 << 20, tv.RoomOptions(voxel=0.05)) as room:
         add(room)

@@ -331,7 +331,8 @@ class tv_room_triangle(Structure):
 class tv_room_mesh_options(Structure):
     _fields_ = [("struct_size", c_uint32), ("min_maps", c_int32),
                 ("min_piece_triangles", c_int32), ("measured_only", c_int32),
-                ("min", c_double * 3), ("max", c_double * 3)]
+                ("min", c_double * 3), ("max", c_double * 3), ("planes", c_void_p),
+                ("num_planes", c_int32), ("reserved", c_int32), ("max_sigma", c_double)]
 
 
 class tv_room_plane(Structure):

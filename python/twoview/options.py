@@ -182,6 +182,7 @@ class RoomMeshOptions(_Options):
     measured_only: bool = False  #: leave out what was inferred
     min: Sequence[float] = (0.0, 0.0, 0.0)  #: only blocks that touch this box; zeros: all
     max: Sequence[float] = (0.0, 0.0, 0.0)
+    max_sigma: float = 0.0  #: leave out triangles of vertices with a larger sigma; 0: none
 
 
 @dataclass(frozen=True)

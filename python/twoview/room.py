@@ -169,9 +169,14 @@ class Room:
         return RoomState(s.num_maps, s.num_blocks, s.cap_blocks, s.voxel, np.array(s.min),
                          np.array(s.max))
 
-    def mesh(self, options: Optional[RoomMeshOptions] = None, **keywords: Any) -> RoomMesh:
-        """tv_room_mesh: the surface. options: a RoomMeshOptions, or its fields as keywords."""
+    def mesh(self, options: Optional[RoomMeshOptions] = None, *,
+             planes: Optional[np.ndarray] = None, **keywords: Any) -> RoomMesh:
+        """tv_room_mesh: the surface. options: a RoomMeshOptions, or its fields as keywords.
+        planes: of find_planes; surface that lies on one of them is drawn to it."""
         wanted = to_struct(self.library, RoomMeshOptions, options, keywords)
+        if planes is not None:
+            planes = _abi.check_array("planes", planes, _abi.ROOM_PLANE)
+            wanted.planes, wanted.num_planes = planes.ctypes.data, len(planes)
         num_vertices, num_triangles = c_int32(), c_int32()
         vertices, triangles = np.zeros(0, _abi.ROOM_VERTEX), np.zeros((0, 3), np.int32)
 

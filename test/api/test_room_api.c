@@ -308,6 +308,45 @@ static void test_a_mesh_is_refused(void) {
   tv_room_mesh_options_init(&o);
   o.max[1] = NAN;
   expect_mesh_refusal(TV_ERR_NOT_FINITE, &o);
+  tv_room_mesh_options_init(&o);
+  o.max_sigma = -1;
+  expect_mesh_refusal(TV_ERR_ARGUMENT, &o);
+  o.max_sigma = INFINITY;
+  expect_mesh_refusal(TV_ERR_NOT_FINITE, &o);
+  tv_room_mesh_options_init(&o);
+  o.reserved = 1;
+  expect_mesh_refusal(TV_ERR_ARGUMENT, &o);
+}
+
+static void test_the_planes_of_a_mesh_are_checked(void) {
+  static tv_room_plane planes[TV_ROOM_MAX_PLANES + 1];
+  tv_room_mesh_options o;
+  TEST_ASSERT_EQUAL_INT(TV_OK, add());
+  tv_room_mesh_options_init(&o);
+  o.num_planes = 1;
+  expect_mesh_refusal(TV_ERR_NULL, &o);
+  o.planes = planes;
+  o.num_planes = -1;
+  expect_mesh_refusal(TV_ERR_ARGUMENT, &o);
+  o.num_planes = TV_ROOM_MAX_PLANES + 1;
+  expect_mesh_refusal(TV_ERR_ARGUMENT, &o);
+  o.num_planes = 2;
+  planes[1].normal[2] = NAN;
+  expect_mesh_refusal(TV_ERR_NOT_FINITE, &o);
+  planes[1].normal[2] = 0;
+  TEST_ASSERT_EQUAL_INT(TV_OK, mesh(&o));
+  o.planes = (const tv_room_plane *)(const void *)vertices;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, mesh(&o));
+}
+
+/* A program of the release before knows the options up to the box only. */
+static void test_shorter_mesh_options_mean_no_planes(void) {
+  tv_room_mesh_options o;
+  tv_room_mesh_options_init_sized(&o, 64);
+  memset((uint8_t *)&o + 64, API_PATTERN, sizeof o - 64);
+  TEST_ASSERT_EQUAL_INT(TV_OK, add());
+  TEST_ASSERT_EQUAL_INT(TV_OK, mesh(&o));
+  TEST_ASSERT_TRUE(num_vertices > 2000);
 }
 
 static void test_a_mesh_says_how_much_room_it_needs(void) {
@@ -462,6 +501,8 @@ int main(void) {
   RUN_TEST(test_a_room_is_coarsened_sixteen_times);
   RUN_TEST(test_a_state_is_written_as_far_as_its_size);
   RUN_TEST(test_a_mesh_is_refused);
+  RUN_TEST(test_the_planes_of_a_mesh_are_checked);
+  RUN_TEST(test_shorter_mesh_options_mean_no_planes);
   RUN_TEST(test_a_mesh_says_how_much_room_it_needs);
   RUN_TEST(test_a_mesh_of_few_views_is_left_out_when_wanted);
   RUN_TEST(test_planes_are_refused_and_found);

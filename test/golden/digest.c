@@ -55,7 +55,7 @@ LAYOUT(tv_room_options, 24, max_distance, 16);
 LAYOUT(tv_room_state, 72, max, 48);
 LAYOUT(tv_room_vertex, 40, reserved, 36);
 LAYOUT(tv_room_triangle, 12, idx_vertex, 0);
-LAYOUT(tv_room_mesh_options, 64, max, 40);
+LAYOUT(tv_room_mesh_options, 88, max_sigma, 80);
 LAYOUT(tv_room_plane, 88, reserved, 84);
 LAYOUT(tv_room_plane_options, 48, gravity_sigma_rad, 40);
 LAYOUT(tv_room_infer_options, 8, max_step, 4);

@@ -539,6 +539,71 @@ void test_plain_walls_are_found_by_their_edges_and_inferred_between() {
   for (const tv_room_vertex& v : vertices) TEST_ASSERT_EQUAL(0, v.inferred);
 }
 
+// A wall that was measured with waves of 2 cm, at their sigma, and a box before it.
+void test_surface_on_a_plane_is_drawn_to_it_and_other_surface_stays() {
+  const double kWall = 2.007, kBox = 1.6;
+  Map m = wall_at(kWall, Vec3(0, 0, 0), 0.02f);
+  for (size_t y = 0; y < 120; ++y) {
+    for (size_t x = 0; x < 160; ++x) {
+      const float wave = 0.02f * ((x / 20 + y / 20) % 2 == 0 ? 1.0f : -1.0f);
+      const bool on_box = x >= 60 && x < 100 && y >= 40 && y < 80;
+      float& distance = m.distance[y * 160 + x];
+      distance = on_box ? distance * static_cast<float>(kBox / kWall) : distance + wave;
+    }
+  }
+  tv_room* room = new_room();
+  TEST_ASSERT_EQUAL(TV_OK, add(room, m));
+  const Planes planes = find_planes(room, false);
+  TEST_ASSERT_TRUE(planes.num >= 1);
+  tv_room_mesh_options options;
+  tv_room_mesh_options_init(&options);
+  const auto rms_of_wall = [&](double* most_sigma) {
+    mesh(room, &options);
+    double sum = 0, count = 0;
+    *most_sigma = 0;
+    for (const tv_room_vertex& v : vertices) {
+      const double away = static_cast<double>(v.position[1]) - kWall;
+      if (std::fabs(away) > 0.1 || v.normal[1] > -0.9f) continue;
+      sum += away * away, ++count;
+      *most_sigma = std::max(*most_sigma, static_cast<double>(v.sigma));
+    }
+    TEST_ASSERT_TRUE(count > 1000);
+    return std::sqrt(sum / count);
+  };
+  double sigma_before, sigma_after;
+  const double before = rms_of_wall(&sigma_before);
+  const std::vector<tv_room_vertex> all = vertices;
+  options.planes = planes.planes;
+  options.num_planes = 1;
+  const double after = rms_of_wall(&sigma_after);
+  TEST_ASSERT_TRUE(before > 0.01 && after < 0.5 * before);
+  TEST_ASSERT_TRUE(sigma_before > 0.015 && sigma_after <= kVoxel / 3 && sigma_after > 0.005);
+  TEST_ASSERT_EQUAL(all.size(), vertices.size());
+  for (size_t v = 0; v < all.size(); ++v) {
+    if (static_cast<double>(all[v].position[1]) < kBox + 0.1)
+      TEST_ASSERT_EQUAL_MEMORY(&all[v], &vertices[v], 40);
+  }
+}
+
+void test_surface_of_a_large_sigma_is_left_out_when_wanted() {
+  Map m = wall_at(2.007, Vec3(0, 0, 0), 0.02f);
+  for (size_t i = 0; i < m.sigma.size(); ++i)
+    if (i % 160 >= 80) m.sigma[i] = 0.06f;
+  tv_room* room = new_room();
+  TEST_ASSERT_EQUAL(TV_OK, add(room, m));
+  mesh(room);
+  const size_t all = vertices.size();
+  tv_room_mesh_options options;
+  tv_room_mesh_options_init(&options);
+  options.max_sigma = 0.045;
+  mesh(room, &options);
+  TEST_ASSERT_TRUE(vertices.size() > all / 3 && vertices.size() < 2 * all / 3);
+  for (const tv_room_vertex& v : vertices) TEST_ASSERT_TRUE(v.sigma <= 0.045f);
+  for (const tv_room_triangle& t : triangles)
+    for (const int32_t idx : t.idx_vertex)
+      TEST_ASSERT_TRUE(static_cast<size_t>(idx) < vertices.size());
+}
+
 // A wall with an opening into another room: nothing is carried across it, although its middle is
 // plain and the wall borders on it, because farther things were measured around its middle.
 void test_a_plane_is_not_carried_where_farther_things_were_measured() {
@@ -606,6 +671,8 @@ int main(void) {
   RUN_TEST(test_distances_that_are_none_are_unknown);
   RUN_TEST(test_small_pieces_are_left_out);
   RUN_TEST(test_plain_walls_are_found_by_their_edges_and_inferred_between);
+  RUN_TEST(test_surface_on_a_plane_is_drawn_to_it_and_other_surface_stays);
+  RUN_TEST(test_surface_of_a_large_sigma_is_left_out_when_wanted);
   RUN_TEST(test_a_plane_is_not_carried_where_farther_things_were_measured);
   RUN_TEST(test_an_inferred_wall_that_a_map_sees_through_vanishes);
   return UNITY_END();

@@ -193,45 +193,6 @@ typedef struct tv_room_triangle {
   int32_t idx_vertex[3];
 } tv_room_triangle;
 
-/* Options of tv_room_mesh. Filled by tv_room_mesh_options_init. */
-typedef struct tv_room_mesh_options {
-  /* The caller's sizeof, set by tv_room_mesh_options_init. */
-  uint32_t struct_size;
-  /* The fewest maps that have seen the surface at a voxel, [1, 255], default 1. */
-  int32_t min_maps;
-  /* Connected pieces of fewer triangles are left out, [0, 2^31), default 64. */
-  int32_t min_piece_triangles;
-  /* 1: only what was measured; 0 (default): what was inferred, too. */
-  int32_t measured_only;
-  /* Only blocks that touch this box of the world, in the unit of the poses, make triangles; zeros
-     (default): all. */
-  double min[3], max[3];
-} tv_room_mesh_options;
-
-/* Writes the default options into a struct of struct_size bytes; null is allowed. Programs call
-   tv_room_mesh_options_init. */
-TV_API void tv_room_mesh_options_init_sized(tv_room_mesh_options *options, size_t struct_size);
-/* Writes the default options; null is allowed. */
-#define tv_room_mesh_options_init(options) \
-  tv_room_mesh_options_init_sized((options), sizeof *(options))
-
-/* Computes the surface: a vertex in each cell of eight voxels through which it passes, and two
-   triangles around each edge between two voxels that it crosses. Vertices are not repeated, each is
-   of a triangle, and the mesh is closed except where what lies beside was not seen.
-   options: null means the defaults.
-   vertices, triangles: room for cap_vertices and cap_triangles; they overlap nothing else.
-   *num_vertices, *num_triangles: how many were written. Where that is too little, TV_ERR_CAPACITY
-   is returned, the arrays hold nothing of use, and the counts are those that are enough: calling
-   with capacities of 0 (and null arrays) asks for them.
-   The order is that in which the blocks lie in the room's memory, and the same on every CPU. The
-   room is only read, but for scratch in its memory. Takes a step for each voxel of the room.
-   Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (an option, a capacity below 0),
-   TV_ERR_NOT_FINITE (an option), TV_ERR_CAPACITY, TV_ERR_OVERLAP. */
-TV_API tv_status tv_room_mesh(tv_room *room, const tv_room_mesh_options *options,
-                              tv_room_vertex *vertices, int32_t cap_vertices,
-                              tv_room_triangle *triangles, int32_t cap_triangles,
-                              int32_t *num_vertices, int32_t *num_triangles);
-
 /* The most planes of a room. */
 #define TV_ROOM_MAX_PLANES 64
 
@@ -265,6 +226,58 @@ typedef struct tv_room_plane {
   /* Always 0. */
   int32_t reserved;
 } tv_room_plane;
+
+/* Options of tv_room_mesh. Filled by tv_room_mesh_options_init. */
+typedef struct tv_room_mesh_options {
+  /* The caller's sizeof, set by tv_room_mesh_options_init. */
+  uint32_t struct_size;
+  /* The fewest maps that have seen the surface at a voxel, [1, 255], default 1. */
+  int32_t min_maps;
+  /* Connected pieces of fewer triangles are left out, [0, 2^31), default 64. */
+  int32_t min_piece_triangles;
+  /* 1: only what was measured; 0 (default): what was inferred, too. */
+  int32_t measured_only;
+  /* Only blocks that touch this box of the world, in the unit of the poses, make triangles; zeros
+     (default): all. */
+  double min[3], max[3];
+  /* num_planes of tv_room_find_planes, which are flat to within a third of a voxel: a vertex that
+     lies on one within 1.5 of its standard deviations, and is turned by less than 45 degrees, is
+     drawn to the nearest of them, as by a measurement. Its sigma is that of both. Null (default):
+     none. They are read during the call only. */
+  const tv_room_plane *planes;
+  /* [0, TV_ROOM_MAX_PLANES], default 0. */
+  int32_t num_planes;
+  /* Must be 0. */
+  int32_t reserved;
+  /* Triangles of a vertex with a larger sigma are left out, in the unit of the poses; 0 (default):
+     none are. */
+  double max_sigma;
+} tv_room_mesh_options;
+
+/* Writes the default options into a struct of struct_size bytes; null is allowed. Programs call
+   tv_room_mesh_options_init. */
+TV_API void tv_room_mesh_options_init_sized(tv_room_mesh_options *options, size_t struct_size);
+/* Writes the default options; null is allowed. */
+#define tv_room_mesh_options_init(options) \
+  tv_room_mesh_options_init_sized((options), sizeof *(options))
+
+/* Computes the surface: a vertex in each cell of eight voxels through which it passes, and two
+   triangles around each edge between two voxels that it crosses. Vertices are not repeated, each is
+   of a triangle, and the mesh is closed except where what lies beside was not seen.
+   options: null means the defaults.
+   vertices, triangles: room for cap_vertices and cap_triangles; they overlap nothing else.
+   *num_vertices, *num_triangles: how many were written. Where that is too little, TV_ERR_CAPACITY
+   is returned, the arrays hold nothing of use, and the counts are those that are enough: calling
+   with capacities of 0 (and null arrays) asks for them.
+   The order is that in which the blocks lie in the room's memory, and the same on every CPU. The
+   room is only read, but for scratch in its memory. Takes a step for each voxel of the room, and
+   vertices x planes steps.
+   Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (an option, a capacity below 0),
+   TV_ERR_NOT_FINITE (an option or a plane), TV_ERR_CAPACITY, TV_ERR_OVERLAP. */
+TV_API tv_status tv_room_mesh(tv_room *room, const tv_room_mesh_options *options,
+                              tv_room_vertex *vertices, int32_t cap_vertices,
+                              tv_room_triangle *triangles, int32_t cap_triangles,
+                              int32_t *num_vertices, int32_t *num_triangles);
 
 /* Options of tv_room_find_planes. Filled by tv_room_plane_options_init. */
 typedef struct tv_room_plane_options {

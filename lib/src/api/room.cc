@@ -21,7 +21,7 @@ constexpr int32_t kMaxSide = 16384;
 constexpr int32_t kMaxLevels = 16;
 constexpr tv_room_options kDefaults = {sizeof(tv_room_options), 3, 0.03, 0.0};
 constexpr tv_room_mesh_options kMeshDefaults = {
-    sizeof(tv_room_mesh_options), 1, 64, 0, {0, 0, 0}, {0, 0, 0}};
+    sizeof(tv_room_mesh_options), 1, 64, 0, {0, 0, 0}, {0, 0, 0}, nullptr, 0, 0, 0};
 constexpr tv_room_plane_options kPlaneDefaults = {
     sizeof(tv_room_plane_options), 0, 0, {0, 0, 0}, 0.02};
 constexpr tv_room_infer_options kInferDefaults = {sizeof(tv_room_infer_options), 3};
@@ -118,15 +118,31 @@ tv_status read_plane_request(const tv_room& room, const tv_room_plane_options* g
   return valid ? TV_OK : TV_ERR_ARGUMENT;
 }
 
+bool are_finite(const tv_room_plane* planes, int32_t num_planes) {
+  bool finite = true;
+  for (int32_t k = 0; k < num_planes; ++k) {
+    const tv_room_plane& p = planes[k];
+    finite = finite && all_finite(p.normal, 3) && is_finite(p.offset) && is_finite(p.sigma);
+  }
+  return finite;
+}
+
 tv_status read_request(const tv_room& room, const tv_room_mesh_options* given,
                        MeshRequest* request) {
   tv_room_mesh_options o = kMeshDefaults;
   const tv_status status = read_sized(given, &o);
   if (status != TV_OK) return status;
-  if (!all_finite(o.min, 3) || !all_finite(o.max, 3)) return TV_ERR_NOT_FINITE;
-  bool valid =
-      within(o.min_maps, 1, 255) && o.min_piece_triangles >= 0 && within(o.measured_only, 0, 1);
-  *request = {o.min_maps, o.min_piece_triangles, o.measured_only != 0, {}, {}};
+  if (o.planes == nullptr && o.num_planes > 0) return TV_ERR_NULL;
+  if (!all_finite(o.min, 3) || !all_finite(o.max, 3) || !is_finite(o.max_sigma)) {
+    return TV_ERR_NOT_FINITE;
+  }
+  bool valid = within(o.min_maps, 1, 255) && o.min_piece_triangles >= 0 &&
+               within(o.measured_only, 0, 1) && within(o.num_planes, 0, TV_ROOM_MAX_PLANES) &&
+               o.reserved == 0 && o.max_sigma >= 0;
+  if (!valid) return TV_ERR_ARGUMENT;
+  if (!are_finite(o.planes, o.num_planes)) return TV_ERR_NOT_FINITE;
+  *request = {o.min_maps, o.min_piece_triangles, o.measured_only != 0, {}, {},
+              o.planes,   o.num_planes,          o.max_sigma};
   bool everywhere = true;
   for (int i = 0; i < 3; ++i) everywhere = everywhere && o.min[i] == 0 && o.max[i] == 0;
   for (int i = 0; i < 3; ++i) {
@@ -264,13 +280,14 @@ tv_status tv_room_mesh(tv_room* room, const tv_room_mesh_options* options, tv_ro
   const tv_status status = tv::read_request(*room, options, &request);
   if (status != TV_OK) return status;
   if (cap_vertices < 0 || cap_triangles < 0) return TV_ERR_ARGUMENT;
-  const tv::Bytes arrays[5] = {
+  const tv::Bytes arrays[6] = {
       {vertices, static_cast<size_t>(cap_vertices) * sizeof(tv_room_vertex)},
       {triangles, static_cast<size_t>(cap_triangles) * sizeof(tv_room_triangle)},
       {num_vertices, sizeof *num_vertices},
       {num_triangles, sizeof *num_triangles},
-      tv::bytes_of(*room)};
-  if (tv::outputs_overlap(arrays, 4, 5)) return TV_ERR_OVERLAP;
+      tv::bytes_of(*room),
+      {request.planes, static_cast<size_t>(request.num_planes) * sizeof(tv_room_plane)}};
+  if (tv::outputs_overlap(arrays, 4, 6)) return TV_ERR_OVERLAP;
   int64_t most_vertices, most_triangles;
   tv::count_mesh(*room, request, &most_vertices, &most_triangles);
   if (most_vertices > INT32_MAX || most_triangles > INT32_MAX) return TV_ERR_LIMITS;
@@ -327,12 +344,7 @@ tv_status tv_room_infer(const tv_room* room, const tv_camera* camera, const doub
       !tv::within(num_planes, 0, TV_ROOM_MAX_PLANES) || !tv::within(checked.max_step, 0, 255)) {
     return TV_ERR_ARGUMENT;
   }
-  for (int32_t k = 0; k < num_planes; ++k) {
-    const tv_room_plane& p = planes[k];
-    if (!tv::all_finite(p.normal, 3) || !tv::is_finite(p.offset) || !tv::is_finite(p.sigma)) {
-      return TV_ERR_NOT_FINITE;
-    }
-  }
+  if (!tv::are_finite(planes, num_planes)) return TV_ERR_NOT_FINITE;
   if (reinterpret_cast<uintptr_t>(memory) % TV_CONTEXT_ALIGNMENT != 0) return TV_ERR_ALIGNMENT;
   if (size_bytes < tv::infer_bytes(view.map.width, view.map.height)) return TV_ERR_MEMORY;
   const size_t pixels = static_cast<size_t>(view.map.width) * static_cast<size_t>(view.map.height);

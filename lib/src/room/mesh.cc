@@ -3,6 +3,8 @@
 #include <cmath>
 #include <initializer_list>
 
+#include "room/flatten.h"
+
 namespace tv {
 namespace {
 
@@ -258,6 +260,15 @@ float distance_sq(const tv_room_vertex& a, const tv_room_vertex& b) {
   return sum;
 }
 
+// Whether no vertex of a triangle has a larger standard deviation than is wanted.
+bool is_sure(const MeshRequest& request, const tv_room_vertex* vertices, const int32_t idx[3]) {
+  bool sure = true;
+  for (int k = 0; k < 3; ++k) {
+    sure = sure && static_cast<double>(vertices[idx[k]].sigma) <= request.max_sigma;
+  }
+  return sure || request.max_sigma == 0;
+}
+
 // Pieces are sets of vertices, joined in their `reserved`: the vertex that stands for its set holds
 // -1 less the number of its triangles, all others one that is nearer to it.
 int32_t piece_of(tv_room_vertex* vertices, int32_t v) {
@@ -344,7 +355,7 @@ void count_mesh(tv_room& room, const MeshRequest& request, int64_t* num_vertices
 
 void make_surfels(tv_room& room) {
   Sample grid[kGrid * kGrid * kGrid];
-  const MeshRequest request = {1, 0, true, {}, {}};
+  const MeshRequest request = {1, 0, true, {}, {}, nullptr, 0, 0};
   const float voxel = static_cast<float>(room.options.voxel);
   for (int32_t index = 0; index < room.end_blocks; ++index) {
     Surfel& surfel = room.surfels[index];
@@ -390,6 +401,7 @@ void write_mesh(tv_room& room, const MeshRequest& request, MeshOutput* output) {
       if ((block.cells >> cell & 1) == 0) continue;
       tv_room_vertex* vertex = &output->vertices[output->num_vertices++];
       make_vertex(room, cell_of(grid, cell), place, cell, vertex);
+      draw_to_planes(room, request.planes, request.num_planes, vertex);
       vertex->reserved = -1;
     }
   }
@@ -400,12 +412,13 @@ void write_mesh(tv_room& room, const MeshRequest& request, MeshOutput* output) {
     int32_t owners[8];
     gather(room, request, place, grid);
     owners_around(room, request, place, owners);
-    for_quads(room, grid, owners, [output](const int32_t quad[4]) {
+    for_quads(room, grid, owners, [&request, output](const int32_t quad[4]) {
       const tv_room_vertex* v = output->vertices;
       const bool first = distance_sq(v[quad[0]], v[quad[2]]) <= distance_sq(v[quad[1]], v[quad[3]]);
       const int32_t halves[2][3] = {{quad[0], quad[1], quad[first ? 2 : 3]},
                                     {quad[first ? 0 : 1], quad[2], quad[3]}};
       for (const int32_t(&half)[3] : halves) {
+        if (!is_sure(request, v, half)) continue;
         tv_room_triangle* triangle = &output->triangles[output->num_triangles++];
         for (int k = 0; k < 3; ++k) triangle->idx_vertex[k] = half[k];
         join(output->vertices, *triangle);

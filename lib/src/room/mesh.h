@@ -12,6 +12,9 @@ struct MeshRequest {
   int32_t min_maps, min_piece_triangles;
   bool measured_only;
   int32_t from[3], to[3];  // blocks, both ends included
+  const tv_room_plane* planes;
+  int32_t num_planes;
+  double max_sigma;  // of the vertices of a triangle; 0: any
 };
 
 struct MeshOutput {

@@ -38,9 +38,9 @@ std::vector<CLI::Option*> add_room_options(CLI::App& verb, RoomSettings& setting
   voxel->default_str("");
   CLI::Option* memory = add_number(verb, "max-memory", &settings.max_memory_mib, 1, kMostMiB,
                                    "MiB for the room; where it is full, voxels get coarser");
-  CLI::Option* measured = verb.add_flag(
-      "--measured-only", settings.measured_only,
-      "only what was measured; this version infers nothing, so this is what it always does");
+  CLI::Option* measured =
+      verb.add_flag("--measured-only", settings.measured_only,
+                    "only what was measured: planes are not carried across plain walls");
   CLI::Option* depth = verb.add_flag("--depth-maps", settings.keeps_depth_maps,
                                      "write the keyframes' depth maps to depth/, 16 bits");
   std::vector<CLI::Option*> added = {voxel, memory, measured, depth};
@@ -97,6 +97,10 @@ std::vector<std::string> room_notes(const RoomModel& model, bool was_stopped) {
                   model.voxel, model.first_voxel);
     notes.emplace_back(text);
   }
+  if (model.inferred_without_memory > 0)
+    notes.push_back("the room's memory was full: the plain walls of " +
+                    std::to_string(model.inferred_without_memory) +
+                    " keyframes were left out (--max-memory)");
   if (model.keyframes_used == 1)
     notes.emplace_back("one keyframe alone has a depth map: no other one confirms what it shows");
   if (model.pictures_missing > 0 && !was_stopped)

@@ -51,7 +51,9 @@ class RoomBuilder {
   void fill(const Map& map, tv_depth_map& out);
   void find_up(RoomModel& model) const;
   void find_planes(RoomModel& model) const;
-  RoomMesh mesh() const;
+  size_t see_through();
+  void infer(RoomModel& model);
+  RoomMesh mesh(const RoomModel& model) const;
   void add_page_mesh(RoomModel& model);
   void add_depth_maps(RoomModel& model);
   void count_pixels(RoomModel& model) const;

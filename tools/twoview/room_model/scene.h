@@ -40,7 +40,7 @@ struct RoomScene {
 struct RoomSettings {
   double voxel = 0;  // in the unit of the poses; 0: from the scene
   int32_t max_memory_mib = 64;
-  bool measured_only = false;     // nothing is inferred yet, so that it makes no difference
+  bool measured_only = false;     // nothing is carried across what has no texture
   bool keeps_depth_maps = false;  // for depth/
 };
 
@@ -99,6 +99,7 @@ struct RoomModel {
   cv::Point2d free_origin;             // corner of the first cell, in room axes
   int keyframes_used = 0;              // that gave a depth map
   int keyframes_without = 0;           // that did not
+  int inferred_without_memory = 0;     // keyframes whose plain walls did not fit
   int pictures_missing = 0;            // pictures of keyframes and partners that could not be read
   double ms_depth = 0, ms_fusion = 0;  // CPU time a keyframe
   double ms_mesh = 0;                  // in all
