@@ -144,7 +144,7 @@ tvs_status tvm_estimator_init(tvm_estimator *estimator, const tvm_estimator_opti
   }
   memset(estimator, 0, sizeof *estimator);
   estimator->options = *options;
-  estimator->last_segment = -1;
+  estimator->last_segment = estimator->max_segment = -1;
   estimator->last_ns = estimator->told_ns = INT64_MIN;
   return TVS_OK;
 }

@@ -142,6 +142,18 @@ static int is_upright(const tvm_estimator *e, const tv_odometry_state *state,
                             : cosine) <= MOST_TILT_RAD + 3 * attitude->sigma_rad;
 }
 
+/* Whether the segment's x axis is that of the session's world: a segment from before the vehicle
+   started again keeps the heading of the run that it began in. */
+static int has_heading(const tvm_session *s, tvm_estimator *e, const tv_odometry_state *state) {
+  if (s->clock_id != e->run_id) {
+    if (e->run_id != 0) e->first_segment = e->max_segment + 1;
+    e->run_id = s->clock_id;
+  }
+  if (!state->has_pose) return 0;
+  if (state->segment > e->max_segment) e->max_segment = state->segment;
+  return state->segment >= e->first_segment;
+}
+
 tvs_status tvm_session_send_track(tvm_session *session, tvm_estimator *estimator,
                                   const tvm_track *tracked, tvm_estimate *estimate) {
   tvm_estimate own;
@@ -164,6 +176,10 @@ tvs_status tvm_session_send_track(tvm_session *session, tvm_estimator *estimator
     known.time_us = (uint64_t)time.device_ns / 1000;
     known.is_upright = tracked->state->has_pose && is_upright(estimator, tracked->state, &attitude);
     known.heading_rad = session->yaw0_rad;
+  }
+  if (!has_heading(session, estimator, tracked->state) &&
+      estimator->options.world == TVM_WORLD_NED) {
+    known.is_upright = 0;
   }
   status = tvm_estimator_update(estimator, &known, &own);
   if (status != TVS_OK) return status;

@@ -1,5 +1,6 @@
 """Tests of --mavlink over real sockets: a simulated vehicle (mavlink_vehicle.py) that speaks
 through pymavlink, and a film of a flight through a room whose poses are known."""
+import csv
 import json
 import math
 import os
@@ -257,6 +258,107 @@ class Mavlink(unittest.TestCase):
                          "--camera", self.camera, "-o", output)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assert_flown(output)
+
+    def told(self, output, *options):
+        """What the vehicle hears of an odometry: {type: messages}."""
+        with world.Vehicle(mavlink, self.port) as vehicle:
+            result = run("odometry", "--mavlink", self.address, "--camera-source", self.film,
+                         "--camera", self.camera, "-o", output, *options)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(vehicle.wrong, [])
+        heard = {}
+        for message in vehicle.heard:
+            heard.setdefault(message.get_type(), []).append(message)
+        # Nothing of this steers.
+        self.assertLessEqual(set(heard), {"HEARTBEAT", "TIMESYNC", "COMMAND_LONG", "ODOMETRY",
+                                          "VISION_POSITION_ESTIMATE", "STATUSTEXT"})
+        self.assertEqual({m.command for m in heard["COMMAND_LONG"]},
+                         {mavlink.MAV_CMD_SET_MESSAGE_INTERVAL})
+        return heard, result
+
+    def assert_packed_as_pymavlink_does(self, message):
+        """Byte for byte: pymavlink packs the fields that it has read into the same packet."""
+        link = mavlink.MAVLink(None, srcSystem=message.get_srcSystem(),
+                               srcComponent=message.get_srcComponent())
+        link.seq = message.get_seq()
+        fields = [getattr(message, name) for name in message.fieldnames]
+        self.assertEqual(type(message)(*fields).pack(link), bytes(message.get_msgbuf()))
+
+    @NEEDS_ODOMETRY
+    def test_the_vehicle_is_told_where_it_is(self):
+        output = self.folder / "told"
+        heard, result = self.told(output, "--send-odometry", "--send-vision-position")
+        with open(output / "frames.csv", newline="") as file:
+            rows = list(csv.DictReader(file))
+        known = [row for row in rows if row["status"] == "tracking" and row["scale"] == "metric"]
+        odometry, positions = heard["ODOMETRY"], heard["VISION_POSITION_ESTIMATE"]
+        # Each tracked frame in metres but the first of a stretch, which has no velocity yet.
+        self.assertGreater(len(known), 20)
+        self.assertLessEqual(len(odometry), len(known))
+        self.assertGreater(len(odometry), 0.8 * len(known))
+        self.assertIn(f"{len(odometry)} frames were sent to the vehicle", result.stdout)
+        self.assertEqual(len(positions), len(odometry))
+        numbers = [m.get_seq() for messages in heard.values() for m in messages]
+        self.assertEqual(len(set(numbers)), min(256, len(numbers)))
+        for m, p in zip(odometry, positions):
+            for message in (m, p):
+                self.assertEqual((message.get_srcSystem(), message.get_srcComponent()), (7, 197))
+                self.assert_packed_as_pymavlink_does(message)
+            self.assertEqual((m.frame_id, m.child_frame_id), (mavlink.MAV_FRAME_LOCAL_FRD,
+                                                              mavlink.MAV_FRAME_BODY_FRD))
+            self.assertEqual(m.estimator_type, mavlink.MAV_ESTIMATOR_TYPE_VIO)
+            self.assertTrue(1 <= m.quality <= 100, m.quality)
+            self.assertEqual((p.usec, p.x, p.y, p.z, p.reset_counter),
+                             (m.time_usec, m.x, m.y, m.z, m.reset_counter))
+            self.assertEqual(list(p.covariance), list(m.pose_covariance))
+            w, x, y, z = m.q
+            R = matrix(x, y, z, w)
+            self.assertLess(angle_deg(R, world.rotation(p.roll, p.pitch, p.yaw)), 0.01)
+            # Level attitudes of the flight, whatever the heading is.
+            self.assertLess(abs(math.degrees(p.roll - world.ROLL)), 1.0)
+            self.assertLess(abs(math.degrees(p.pitch - world.PITCH)), 1.0)
+            for upper in (m.pose_covariance, m.velocity_covariance):
+                full = np.zeros((6, 6))
+                full[np.triu_indices(6)] = upper
+                full += np.triu(full, 1).T
+                self.assertTrue((np.linalg.eigvalsh(full) > 0).all(), full)
+        # The exposures, in the vehicle's clock, which began at BOOT_MS.
+        times = np.array([m.time_usec for m in odometry]) * 1e-6 - world.BOOT_MS * 1e-3
+        self.assertTrue((np.diff(times) > 0).all())
+        self.assertTrue(0 < times[0] and times[-1] < 60, times)
+        seconds = [float(row["timestamp"]) for row in known]
+        self.assertAlmostEqual(times[-1] - times[0], seconds[-1] - seconds[len(known) - len(times)],
+                               delta=0.15)
+        # Where and how fast the vehicle is, in metres; the path's own scale is good to 10 %.
+        places = np.array([(m.x, m.y, m.z) for m in odometry])
+        travelled, expected = places[-1] - places[0], world.VELOCITY * (times[-1] - times[0])
+        self.assertLess(abs(np.linalg.norm(travelled) / np.linalg.norm(expected) - 1), 0.15)
+        speeds = np.array([(m.vx, m.vy, m.vz) for m in odometry])
+        self.assertLess(abs(np.linalg.norm(np.median(speeds, 0)) /
+                            np.linalg.norm(world.VELOCITY) - 1), 0.15)
+        self.assertAlmostEqual(np.median([m.yawspeed for m in odometry]), world.TURN, delta=0.02)
+        texts = [m.text for m in heard["STATUSTEXT"]]
+        self.assertTrue(texts[0].startswith("twoview: ") and "no position" in texts[0], texts)
+        self.assertIn("twoview: position", texts)
+
+    @NEEDS_ODOMETRY
+    def test_north_and_weak_frames_are_sent_on_request(self):
+        heard, _ = self.told(self.folder / "north", "--send-odometry", "--send-north",
+                             "--send-weak")
+        places = np.array([(m.x, m.y, m.z) for m in heard["ODOMETRY"]])
+        self.assertNotIn("VISION_POSITION_ESTIMATE", heard)
+        self.assertEqual({m.frame_id for m in heard["ODOMETRY"]}, {mavlink.MAV_FRAME_LOCAL_NED})
+        north = world.rotation(0, 0, world.HEADING) @ world.VELOCITY
+        travelled = places[-1] - places[0]
+        cosine = travelled @ north / np.linalg.norm(travelled) / np.linalg.norm(north)
+        self.assertLess(math.degrees(math.acos(min(1, cosine))), 8)
+
+    def test_what_is_sent_needs_a_vehicle(self):
+        for options in (("--send-odometry",), ("--send-vision-position",)):
+            self.assert_refused(run("odometry", self.film, "--camera", self.camera, "-o",
+                                    self.folder / "x", *options), "--mavlink")
+        self.assert_refused(run("odometry", "--mavlink", self.address, "--camera", self.camera,
+                                "-o", self.folder / "x", "--send-weak"), "--send-odometry")
 
     def test_info_of_an_old_ardupilot(self):
         with world.Vehicle(mavlink, self.port, autopilot="ardupilot", version=1):

@@ -639,6 +639,31 @@ static void test_north_is_by_the_heading_of_the_vehicle(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1, estimate.position_m[1]);
 }
 
+/* The vehicle starts again with its nose to the south: the old segment's x axis is not known to be
+   that of the new run, a new segment's is. */
+static void test_a_heading_is_not_carried_over_a_reboot(void) {
+  int64_t ms;
+  options.world = TVM_WORLD_NED;
+  begin_session(0);
+  send_track(1200);
+  TEST_ASSERT_EQUAL_INT(TVS_OK, send_track(1220));
+  for (ms = 1420; ms <= 1800; ms += 20) {
+    mavlink_message_t m;
+    const mavlink_attitude_t a = {(uint32_t)(ms - 1400), 0, 0, (float)(2 * RIGHT), 0, 0, 0};
+    mavlink_msg_attitude_encode_status(SYSTEM, 1, &sender, &m, &a);
+    add(&m);
+    now = ms * MS;
+    TEST_ASSERT_EQUAL_INT(TVS_OK, tvm_session_step(session, now));
+  }
+  TEST_ASSERT_EQUAL_INT(TVS_NONE, send_track(1700));
+  TEST_ASSERT_EQUAL_INT(TVM_SILENCE_ATTITUDE, estimate.silence);
+  state.segment = 1;
+  set_place(1, 0, 0);
+  send_track(1720);
+  TEST_ASSERT_EQUAL_INT(TVS_OK, send_track(1740));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-6, -1, estimate.position_m[0]);
+}
+
 static void test_a_map_that_is_not_upright_or_has_no_attitude_is_not_sent(void) {
   begin_session(0);
   send_track(1200);
@@ -763,6 +788,7 @@ int main(void) {
   RUN_TEST(test_the_bytes_of_vision_position_estimate);
   RUN_TEST(test_a_session_sends_the_exposure_in_the_clock_of_the_vehicle);
   RUN_TEST(test_north_is_by_the_heading_of_the_vehicle);
+  RUN_TEST(test_a_heading_is_not_carried_over_a_reboot);
   RUN_TEST(test_a_map_that_is_not_upright_or_has_no_attitude_is_not_sent);
   RUN_TEST(test_a_status_text_says_when_positions_end_and_why);
   RUN_TEST(test_the_autopilot_finds_no_offset_to_our_times);

@@ -93,6 +93,7 @@ class VehicleLink {
     tvm_session_options options;
     tvm_session_options_init(&options);
     options.vehicle_system = vehicle_.system;
+    if (vehicle_.estimates.given()) options.own_component = TVM_COMPONENT_ODOMETRY;
     options.camera_offset_ns = offset_ns_ - static_cast<int64_t>(vehicle_.camera_delay_ms * 1e6);
     return options;
   }
@@ -153,8 +154,9 @@ CameraSource::Kind kind_of(const std::string& name) {
 
 void fly_vehicle(const VehicleAddress& vehicle, const LinkListener& listener,
                  const std::function<bool()>& done, const std::atomic<bool>& stop, double seconds,
-                 bool quiet) {
+                 bool quiet, tvm_session** session) {
   VehicleLink link(vehicle, listener, {});
+  if (session) *session = link.session().get();
   CameraSource camera(vehicle.camera, kind_of(vehicle.camera));
   link.run(&camera, done, stop, seconds, quiet);
 }

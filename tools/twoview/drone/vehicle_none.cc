@@ -1,12 +1,22 @@
 // Replaces vehicle.cc in a program without MAVLink's driver.
 #include "base/error.h"
+#include "drone/estimates.h"
 #include "drone/vehicle.h"
 #include "recording/vehicle.h"
 
 namespace cli {
 
+VehicleEstimates::VehicleEstimates(const EstimateOptions&, const Matrix3&, const Vector3&) {
+  throw BadInput(kNoMavlink);
+}
+
+void VehicleEstimates::send(tvm_session*, int64_t, const tv_odometry_state&,
+                            const std::optional<std::array<double, 12>>&) {}
+
+std::string VehicleEstimates::note() const { return {}; }
+
 void fly_vehicle(const VehicleAddress&, const LinkListener&, const std::function<bool()>&,
-                 const std::atomic<bool>&, double, bool) {
+                 const std::atomic<bool>&, double, bool, tvm_session**) {
   throw BadInput(kNoMavlink);
 }
 

@@ -24,4 +24,20 @@ void add_vehicle(CLI::App& verb, VehicleAddress& vehicle, bool with_camera) {
       ->capture_default_str();
 }
 
+void add_estimates(CLI::App& verb, EstimateOptions& estimates) {
+  CLI::Option* const mavlink = verb.get_option("--mavlink");
+  CLI::Option* const odometry = verb.add_flag(
+      "--send-odometry", estimates.odometry,
+      "send each frame's pose and velocity to the vehicle's filter (ODOMETRY); nothing steers");
+  CLI::Option* const position =
+      verb.add_flag("--send-vision-position", estimates.vision_position,
+                    "send VISION_POSITION_ESTIMATE, beside or in place of ODOMETRY");
+  CLI::Option* const weak = verb.add_flag("--send-weak", estimates.weak,
+                                          "send weak frames, too, with three times the sigmas");
+  CLI::Option* const north =
+      verb.add_flag("--send-north", estimates.north,
+                    "in axes north, east, down by the vehicle's heading (not for ArduPilot)");
+  for (CLI::Option* option : {odometry, position, weak, north}) option->needs(mavlink);
+}
+
 }  // namespace cli

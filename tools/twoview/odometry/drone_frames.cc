@@ -204,7 +204,10 @@ class VehicleFrames : public DriverSource {
  public:
   VehicleFrames(const VehicleAddress& vehicle, double seconds, const std::string& camera_file,
                 bool quiet)
-      : vehicle_(vehicle), seconds_(seconds), mount_(mount_in(camera_file)), quiet_(quiet) {}
+      : vehicle_(vehicle), seconds_(seconds), mount_(mount_in(camera_file)), quiet_(quiet) {
+    if (vehicle.estimates.given())
+      estimates_.emplace(vehicle.estimates, mount_.body_from_camera, mount_.position);
+  }
 
   void run(const Wanted& wanted, const Consumer& consume, const std::atomic<bool>& stop) override {
     Frames frames(wanted, consume, stop);
@@ -219,11 +222,23 @@ class VehicleFrames : public DriverSource {
       if (!frame) return;
       if (const auto at = sample_at(log, host_s(picture), kGapS))
         add_measurements(*at, mount_, *frame);
+      exposed_ns_ = picture.time.host_ns;
       frames.consume(*frame);
     };
     fly_vehicle(
-        vehicle_, listener, [&] { return frames.done.load(); }, stop, seconds_, quiet_);
+        vehicle_, listener, [&] { return frames.done.load(); }, stop, seconds_, quiet_, &session_);
+    session_ = nullptr;
     end(frames);
+  }
+  bool wants_found() const override { return estimates_.has_value(); }
+  void found(const tv_odometry_state& state,
+             const std::optional<std::array<double, 12>>& previous) override {
+    if (session_) estimates_->send(session_, exposed_ns_, state, previous);
+  }
+  std::vector<std::string> notes() const override {
+    std::vector<std::string> notes = DriverSource::notes();
+    if (estimates_) notes.push_back(estimates_->note());
+    return notes;
   }
   bool can_run_again() const override { return false; }
   int num_frames() const override { return -1; }
@@ -235,6 +250,9 @@ class VehicleFrames : public DriverSource {
   double seconds_;
   CameraMount mount_;
   bool quiet_;
+  std::optional<VehicleEstimates> estimates_;
+  tvm_session* session_ = nullptr;  // while it runs
+  int64_t exposed_ns_ = 0;          // when the frame that was given last was exposed
 };
 
 }  // namespace

@@ -162,13 +162,30 @@ void Flight::start(const SourceFrame& first) {
 void Flight::track(const std::atomic<bool>& stop, const std::function<void()>& after_frame) {
   const auto wanted = [this](int index) { return wants(index); };
   const auto consume = [&](const SourceFrame& frame) {
+    const size_t num_given = given_.size();
     track_frame(frame);
+    if (source_.wants_found() && given_.size() > num_given) tell_source();
     if (after_frame) after_frame();
     picture_.release();
     const int next = frame.index / options_.every + 1;
     return options_.max_frames == 0 || next < options_.max_frames;
   };
   source_.run(wanted, consume, stop);
+}
+
+void Flight::tell_source() {
+  std::optional<std::array<double, 12>> previous;
+  if (told_ && told_->has_pose && state_.has_pose && told_->segment == state_.segment) {
+    std::array<double, 12> pose{};
+    int32_t segment = -1;
+    if (tv_odometry_pose_of(odometry_, told_->reference_id, told_->reference_from_cam_R,
+                            told_->reference_from_cam_t, pose.data(), pose.data() + 9,
+                            &segment) == TV_OK &&
+        segment == state_.segment)
+      previous = pose;
+  }
+  source_.found(state_, previous);
+  told_ = state_;
 }
 
 void Flight::track_frame(SourceFrame frame) {

@@ -165,6 +165,8 @@ class Flight {
   void prepare(SourceFrame& frame);
   void start(const SourceFrame& frame);
   void track_frame(SourceFrame frame);
+  // Says what was found of the frame that was given last.
+  void tell_source();
   void add_still_mask();
   void keep_colours(const SourceFrame& frame);
   void locate(SourceFrame frame, FlightFrame& record, int32_t near_id);
@@ -181,6 +183,7 @@ class Flight {
   size_t context_bytes_ = 0;
   tv_odometry* odometry_ = nullptr;
   tv_odometry_state state_;
+  std::optional<tv_odometry_state> told_;  // the last one that the source was told
   std::vector<FlightFrame> frames_;
   cv::Mat picture_;
   cv::Mat still_mask_;

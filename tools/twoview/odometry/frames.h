@@ -14,6 +14,7 @@
 #include "files/exif.h"
 #include "sources/film.h"
 #include "twoview/camera.h"
+#include "twoview/odometry.h"
 
 namespace cli {
 
@@ -83,6 +84,14 @@ class FrameSource {
   // Fits a given camera and the pictures to each other where they are known to differ: a film that
   // a player turns or stretches.
   virtual void fit(tv_camera& camera) { (void)camera; }
+  // Whether `found` is to be called after each frame.
+  virtual bool wants_found() const { return false; }
+  // Says what was found of the frame that was given last. previous: R and t, world_from_cam, of the
+  // frame before it in the map as it is now, where it had a pose of the same segment.
+  virtual void found(const tv_odometry_state& state,
+                     const std::optional<std::array<double, 12>>& previous) {
+    (void)state, (void)previous;
+  }
   // The files that the source reads, which no output may replace.
   virtual std::vector<std::string> files() const { return {}; }
 };

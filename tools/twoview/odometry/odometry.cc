@@ -113,6 +113,8 @@ std::unique_ptr<FrameSource> open_source(const Arguments& a) {
   if (a.vehicle.given()) {
     if (!a.source.empty()) throw BadInput("give SOURCE or --mavlink, not both");
     require_camera_of_live(a, "MAVLink does not describe the camera");
+    if ((a.vehicle.estimates.weak || a.vehicle.estimates.north) && !a.vehicle.estimates.given())
+      throw BadInput("--send-weak and --send-north need --send-odometry or --send-vision-position");
     return open_vehicle(a.vehicle, a.duration, a.camera, a.common.quiet);
   }
 #endif
@@ -657,6 +659,7 @@ void add_odometry(CLI::App& program, Run& run) {
       ->type_name("HOST");
   add_ports(*verb, a->drone);
   add_vehicle(*verb, a->vehicle, true);
+  add_estimates(*verb, a->vehicle.estimates);
   add_duration(*verb, a->duration);
 #endif
   add_common(*verb, a->common, 0, "folder for the results");

@@ -42,7 +42,8 @@ typedef enum tvm_world {
   /* MAV_FRAME_LOCAL_FRD: z down, x along the vehicle's nose when its clock's run began. ArduPilot
      takes no other frame. */
   TVM_WORLD_FRD = 0,
-  /* MAV_FRAME_LOCAL_NED: north, east, down, by the vehicle's own heading when the segment began. */
+  /* MAV_FRAME_LOCAL_NED: north, east, down, by the vehicle's own heading when the segment began. A
+     segment from before the vehicle started again has no heading, and gives nothing. */
   TVM_WORLD_NED = 1
 } tvm_world;
 
@@ -154,6 +155,10 @@ typedef struct tvm_estimator {
   double last_velocity[3], last_rate[3];
   /* What tvm_session_send_track has told last, and when. */
   int32_t has_told, told_silence;
+  /* The run of the vehicle's clock, the newest segment, and the first one that began in this run.
+   */
+  uint32_t run_id;
+  int32_t max_segment, first_segment, reserved;
   int64_t told_ns;
 } tvm_estimator;
 

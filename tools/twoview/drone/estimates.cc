@@ -1,0 +1,57 @@
+#include "drone/estimates.h"
+
+#include <algorithm>
+
+#include "base/error.h"
+#include "recording/driver_session.h"
+
+namespace cli {
+
+VehicleEstimates::VehicleEstimates(const EstimateOptions& options, const Matrix3& body_from_camera,
+                                   const Vector3& camera_in_body) {
+  tvm_estimator_options o;
+  tvm_estimator_options_init(&o);
+  o.messages = (options.odometry ? TVM_SEND_ODOMETRY : 0) |
+               (options.vision_position ? TVM_SEND_VISION_POSITION : 0);
+  o.weak = options.weak ? TVM_WEAK_GROWN : TVM_WEAK_SILENT;
+  o.world = options.north ? TVM_WORLD_NED : TVM_WORLD_FRD;
+  std::copy(body_from_camera.begin(), body_from_camera.end(), o.body_from_camera);
+  std::copy(camera_in_body.begin(), camera_in_body.end(), o.camera_in_body);
+  check_driver(tvm_estimator_init(&estimator_, &o), "the mount of the camera");
+}
+
+void VehicleEstimates::send(tvm_session* session, int64_t host_ns, const tv_odometry_state& state,
+                            const std::optional<std::array<double, 12>>& previous) {
+  tvm_track track{};
+  track.struct_size = sizeof track;
+  track.state = &state;
+  track.host_ns = host_ns;
+  if (previous) {
+    track.has_previous = 1;
+    std::copy_n(previous->begin(), 9, track.previous_R);
+    std::copy_n(previous->begin() + 9, 3, track.previous_t);
+  }
+  tvm_estimate estimate{};
+  estimate.struct_size = sizeof estimate;
+  // A socket that cannot send now is no end of the flight.
+  const tvs_status status = tvm_session_send_track(session, &estimator_, &track, &estimate);
+  if (status == TVS_OK || status == TVS_NONE) ++num_[static_cast<size_t>(estimate.silence)];
+}
+
+std::string VehicleEstimates::note() const {
+  constexpr std::array<const char*, kNumSilences> kWords = {"",
+                                                            "before the map began",
+                                                            "lost",
+                                                            "rotation",
+                                                            "weak",
+                                                            "metre not known",
+                                                            "vertical not known",
+                                                            "velocity not known"};
+  std::string text = std::to_string(num_[TVM_SILENCE_NONE]) + " frames were sent to the vehicle";
+  std::string others;
+  for (size_t k = 1; k < kNumSilences; ++k)
+    if (num_[k] > 0) others += ", " + std::to_string(num_[k]) + " " + kWords[k];
+  return others.empty() ? text : text + "; not sent: " + others.substr(2);
+}
+
+}  // namespace cli
