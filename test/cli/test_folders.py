@@ -32,6 +32,60 @@ class Folders(CliTest):
         self.fill(first=99999999999999999990, pattern="t{}.png")
         self.assertLess(self.track()["truth"]["ate_rmse_percent_of_path"], 1)
 
+    def fill_as(self, names):
+        for name, data in zip(names, PICTURES):
+            self.write(f"frames/{name}", data)
+        return list(names)
+
+    def test_names_that_are_times_or_have_a_sign_come_in_their_order(self):
+        for names in ([f"{t}.png" for t in TIMES],  # 0.0, 0.06666666666666667, ..., 0.4
+                      [f"t_{round(100 + t, 3)}_left.png" for t in TIMES],
+                      [f"{i - 9}.png" for i in range(COUNT)],
+                      [f"1.{i}.png" for i in range(COUNT)]):  # 1.10 is behind 1.9
+            with self.subTest(first=names[:3]):
+                for file in (self.folder / "frames").glob("*"):
+                    file.unlink()
+                self.fill_as(names)
+                result = self.track()
+                self.assertEqual(self.names(), names)
+                self.assertLess(result["truth"]["ate_rmse_percent_of_path"], 1)
+                self.assertEqual(result["notes"], [])
+
+    def test_of_two_pictures_of_a_name_one_is_a_frame(self):
+        self.fill()
+        for i in (1, 5):
+            self.write(f"frames/frame{i}.bmp", PICTURES[i])
+        result = self.track()
+        self.assertEqual(self.names(), [f"frame{i}.png" for i in range(1, COUNT + 1)])
+        self.assertLess(result["truth"]["ate_rmse_percent_of_path"], 1)
+        self.assertEqual(result["notes"], [
+            "2 pictures of frames are left out: frame1.bmp has the name of another picture, but "
+            "for the ending (so are 1 more)"])
+
+    def test_a_link_to_nothing_is_a_missing_frame(self):
+        self.fill()
+        link = self.folder / "frames/frame9.png"
+        link.unlink()
+        link.symlink_to("gone.png")
+        result = self.track()
+        self.assertEqual((result["num_frames"], result["num_unreadable"]), (COUNT, 1))
+        self.assertLess(result["truth"]["ate_rmse_percent_of_path"], 1)
+        self.assertIn("cannot read frames/frame9.png", " ".join(result["notes"]))
+
+    def test_numbers_that_jump_are_named(self):
+        self.fill()
+        for i in (5, 6, 11):
+            (self.folder / f"frames/frame{i}.png").unlink()
+        self.assertEqual(self.track()["notes"], [
+            "the numbers of the pictures' names jump from frame4.png to frame7.png (and in 1 more "
+            "place): they are taken as evenly spaced in time; where some are missing, list the "
+            "times in frames.txt"])
+
+    def test_one_picture_is_no_film(self):
+        self.fill()
+        self.assert_refused(self.run_program("odometry", "frames/frame1.png", "-o", self.out,
+                                             "--focal-35mm", 26), "it is one picture", "folder")
+
     def test_what_is_no_frame_is_left_out_and_named(self):
         self.fill()
         for i in range(1, 4):

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <fstream>
+#include <map>
 
 #include "base/error.h"
 #include "files/image_file.h"
@@ -21,10 +22,43 @@ const Endings kUnreadImages = {".heic", ".heif", ".avif", ".gif", ".dng", ".cr2"
 // The size stands in the first bytes, in JPEG behind EXIF data with a small picture.
 constexpr size_t kHeaderBytes = size_t{1} << 18;
 
-bool ends_as(const fs::path& path, const Endings& endings) {
+// A step between two names' numbers is a jump where it is above this many times the median one.
+constexpr double kJump = 1.5;
+
+std::string ending_of(const fs::path& path) {
   std::string ending = path.extension().string();
   for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return std::find(endings.begin(), endings.end(), ending) != endings.end();
+  return ending;
+}
+
+bool ends_as(const fs::path& path, const Endings& endings) {
+  return std::find(endings.begin(), endings.end(), ending_of(path)) != endings.end();
+}
+
+// Of pictures that differ only in their ending one stays: that of the ending that most of the
+// folder's have, of the first in kImages on a tie.
+void leave_out_second_endings(FolderPictures& pictures) {
+  std::map<std::string, size_t> counts;
+  for (const std::string& name : pictures.names) ++counts[ending_of(name)];
+  const auto is_better = [&](const std::string& a, const std::string& b) {
+    const std::string x = ending_of(a), y = ending_of(b);
+    if (counts[x] != counts[y]) return counts[x] > counts[y];
+    return std::find(kImages.begin(), kImages.end(), x) <
+           std::find(kImages.begin(), kImages.end(), y);
+  };
+  std::map<std::string, std::string> best;  // of each name without its ending
+  for (const std::string& name : pictures.names) {
+    const auto [at, is_new] = best.emplace(fs::path(name).stem().string(), name);
+    if (!is_new && is_better(name, at->second)) at->second = name;
+  }
+  std::vector<std::string> kept;
+  for (std::string& name : pictures.names) {
+    if (best[fs::path(name).stem().string()] == name)
+      kept.push_back(std::move(name));
+    else
+      pictures.left_out.push_back({name, "has the name of another picture, but for the ending"});
+  }
+  pictures.names = std::move(kept);
 }
 
 std::string size_text(cv::Size size) {
@@ -61,7 +95,8 @@ FolderPictures pictures_of(const fs::path& folder) {
   std::error_code error;
   for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
     std::error_code ignored;
-    if (!fs::is_regular_file(at->path(), ignored)) continue;
+    const bool leads_nowhere = at->is_symlink(ignored) && !fs::exists(at->path(), ignored);
+    if (!leads_nowhere && !fs::is_regular_file(at->path(), ignored)) continue;
     const std::string name = at->path().filename().string();
     if (ends_as(name, kImages)) names.push_back(name);
     if (ends_as(name, kUnreadImages)) unread.push_back(name);
@@ -75,11 +110,38 @@ FolderPictures pictures_of(const fs::path& folder) {
     else
       result.names.push_back(name);
   }
+  leave_out_second_endings(result);
+  sort_sequence(result.names);
   for (const std::string& name : unread) {
     const std::string what = unread_picture_file((folder / name).string());
     if (!what.empty()) result.left_out.push_back({name, what});
   }
   return result;
+}
+
+bool has_picture_ending(const fs::path& path) { return ends_as(path, kImages); }
+
+std::string jump_words(const std::vector<std::string>& names) {
+  const std::vector<int64_t> counters = counters_of(names);
+  std::vector<int64_t> steps;
+  for (size_t k = 1; k < counters.size(); ++k) steps.push_back(counters[k] - counters[k - 1]);
+  if (steps.empty()) return "";
+  std::vector<int64_t> sorted = steps;
+  std::nth_element(sorted.begin(), sorted.begin() + sorted.size() / 2, sorted.end());
+  const int64_t usual = sorted[sorted.size() / 2];
+  const auto is_jump = [&](int64_t step) {
+    return static_cast<double>(step) > kJump * static_cast<double>(usual);
+  };
+  const auto first = std::find_if(steps.begin(), steps.end(), is_jump);
+  if (usual < 1 || first == steps.end()) return "";
+  const auto k = static_cast<size_t>(first - steps.begin());
+  const auto count = std::count_if(steps.begin(), steps.end(), is_jump);
+  return "the numbers of the pictures' names jump from " + names[k] + " to " + names[k + 1] +
+         (count > 1 ? " (and in " + std::to_string(count - 1) +
+                          (count > 2 ? " more places)" : " more place)")
+                    : "") +
+         ": they are taken as evenly spaced in time; where some are missing, list the times in "
+         "frames.txt";
 }
 
 cv::Size header_size(const std::string& path) {

@@ -21,15 +21,23 @@ struct LeftOut {
 std::string left_out_words(const std::vector<LeftOut>& left_out, const std::string& where);
 
 struct FolderPictures {
-  std::vector<std::string> names;  // in their natural order
+  std::vector<std::string> names;  // in the order of sort_sequence
   std::vector<LeftOut> left_out;
 };
 
 // The pictures of a folder by their endings, without those of its subfolders. Files that begin with
 // a dot (as ._0000.jpg, which macOS writes beside 0000.jpg) and pictures of formats that are not
-// read are left out. Other files are no pictures, and not mentioned. Throws BadInput where the
-// folder cannot be read.
+// read are left out, and so are second pictures of a name (0000.png beside 0000.jpg: the same
+// picture, its mask or its depths), of the ending that fewer have. A link to a file that is not
+// there is among the names, since its picture is missing. Other files are no pictures, and not
+// mentioned. Throws BadInput where the folder cannot be read.
 FolderPictures pictures_of(const std::filesystem::path& folder);
+
+// Whether a file's ending is that of a picture that is read.
+bool has_picture_ending(const std::filesystem::path& path);
+
+// A line where the numbers of a sequence's names jump, so that pictures may be missing; else empty.
+std::string jump_words(const std::vector<std::string>& names);
 
 // The size in pixels by the file's header; 0x0 where it does not tell.
 cv::Size header_size(const std::string& path);

@@ -360,6 +360,9 @@ std::unique_ptr<FrameSource> open_image_folder(const std::string& path, double f
     leave_out_other_sizes(folder, false);
     for (size_t k = 0; k < folder.frames.size(); ++k)
       folder.frames[k].time_s = static_cast<double>(k) / fps;
+    std::vector<std::string> kept;
+    for (const Listed& listed : folder.frames) kept.push_back(listed.name);
+    add_note(folder, jump_words(kept));
     add_cameras(folder);
     return std::make_unique<ImageFolder>(std::move(folder));
   }

@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "base/error.h"
+#include "files/folder.h"
 #ifdef TWOVIEW_HAS_DRONE
 #include "odometry/drone_frames.h"
 #endif
@@ -38,6 +39,9 @@ std::unique_ptr<FrameSource> open_stored_source(const std::string& path, double 
     if (fps > 0) throw BadInput("--fps: a recording of a drone has times");
     return open_recording_folder(path, camera_file);
   }
+  if (has_picture_ending(path) && fs::is_regular_file(path, error))
+    throw BadInput("cannot read " + path +
+                   " as a film: it is one picture; give the folder of the pictures, and --fps");
   if (fs::is_regular_file(path, error)) return open_film(path, fps);
   return nullptr;
 }
