@@ -151,15 +151,31 @@ tvs_status tvm_estimator_init(tvm_estimator *estimator, const tvm_estimator_opti
 
 /* ---- one frame ---- */
 
+/* Whether the pose is one that a filter may be given: finite, and as large as a float holds. */
+static int is_usable(const tv_odometry_state *s) {
+  double sum = fabs(s->scale_sigma);
+  int k;
+  for (k = 0; k < 3; ++k) sum += fabs(s->world_from_cam_t[k]);
+  for (k = 0; k < 36 && s->has_covariance; ++k) sum += fabs(s->covariance[k]);
+  return is_rotation(s->world_from_cam_R) && sum < 1e6;
+}
+
 static tvm_silence silence_of(const tvm_estimator *e, const tvm_track *track) {
   const tv_odometry_state *s = track->state;
   if (s->status == TV_ODOMETRY_STARTING) return TVM_SILENCE_STARTING;
   if (s->status == TV_ODOMETRY_ROTATION) return TVM_SILENCE_ROTATION;
-  if (s->status == TV_ODOMETRY_LOST || !s->has_pose) return TVM_SILENCE_LOST;
+  if (s->status == TV_ODOMETRY_LOST || !s->has_pose || !is_usable(s)) return TVM_SILENCE_LOST;
   if (s->scale_source == TV_SCALE_UNIT) return TVM_SILENCE_SCALE;
   if (!track->is_upright) return TVM_SILENCE_ATTITUDE;
   if (s->status == TV_ODOMETRY_WEAK && e->options.weak == TVM_WEAK_SILENT) return TVM_SILENCE_WEAK;
   return TVM_SILENCE_NONE;
+}
+
+/* Whether previous_R and previous_t hold a pose. */
+static int has_previous(const tvm_track *track) {
+  const double *t = track->previous_t;
+  return track->has_previous && is_rotation(track->previous_R) &&
+         fabs(t[0]) + fabs(t[1]) + fabs(t[2]) < 1e6;
 }
 
 /* Whether the map's adjustment has moved the last frame by more than its own standard deviation. */
@@ -168,7 +184,7 @@ static int was_corrected(const tvm_estimator *e, const tvm_track *track) {
                                          angle_sq = LEAST_JUMP_RAD * LEAST_JUMP_RAD;
   const double *C = e->last_covariance;
   int k;
-  if (!track->has_previous || !e->has_last) return 0;
+  if (!has_previous(track) || !e->has_last) return 0;
   for (k = 0; k < 3; ++k) moved[k] = track->previous_t[k] - e->last_t[k];
   transpose(e->last_R, Rt);
   multiply(Rt, track->previous_R, turn);
@@ -329,8 +345,8 @@ static void estimate_of(tvm_estimator *e, const tvm_track *track, tvm_estimate *
   double R[9], p[3], last_R[9], last_p[3], now[36] = {0}, last[36] = {0};
   int k;
   body_pose(e, s->world_from_cam_R, s->world_from_cam_t, R, p);
-  body_pose(e, track->has_previous ? track->previous_R : e->last_R,
-            track->has_previous ? track->previous_t : e->last_t, last_R, last_p);
+  body_pose(e, has_previous(track) ? track->previous_R : e->last_R,
+            has_previous(track) ? track->previous_t : e->last_t, last_R, last_p);
   out->has_covariance = s->has_covariance && e->has_last_covariance;
   if (out->has_covariance) {
     body_covariance(e, s->world_from_cam_R, R, s->covariance, now);

@@ -328,6 +328,26 @@ static void test_what_is_not_known_is_not_sent(void) {
   }
 }
 
+static void test_a_number_that_is_not_finite_is_not_sent(void) {
+  double *const places[] = {&state.world_from_cam_R[4], &state.world_from_cam_t[2],
+                            &state.covariance[7], &state.scale_sigma};
+  const double wrong[] = {NAN, INFINITY, 1e30};
+  size_t k, i;
+  begin();
+  set_covariance(0.001, 0.02);
+  update();
+  for (k = 0; k < sizeof places / sizeof places[0]; ++k) {
+    for (i = 0; i < 3; ++i) {
+      const double kept = *places[k];
+      next(40);
+      TEST_ASSERT_EQUAL_INT(TVM_SILENCE_NONE, next(40));
+      *places[k] = wrong[i];
+      TEST_ASSERT_EQUAL_INT(TVM_SILENCE_LOST, next(40));
+      *places[k] = kept;
+    }
+  }
+}
+
 static void test_after_a_pause_a_velocity_is_waited_for(void) {
   begin();
   TEST_ASSERT_EQUAL_INT(TVM_SILENCE_VELOCITY, update());
@@ -780,6 +800,7 @@ int main(void) {
   RUN_TEST(test_the_velocity_errs_by_both_places_and_by_what_changed);
   RUN_TEST(test_the_quality_falls_with_the_place_and_a_weak_frame_grows);
   RUN_TEST(test_what_is_not_known_is_not_sent);
+  RUN_TEST(test_a_number_that_is_not_finite_is_not_sent);
   RUN_TEST(test_after_a_pause_a_velocity_is_waited_for);
   RUN_TEST(test_each_jump_raises_the_reset_counter_once);
   RUN_TEST(test_a_correction_counts_beyond_its_own_sigma);

@@ -1,10 +1,11 @@
 // A session with a vehicle that may send anything at any time, whole packets with any values among
 // it: every sample has a unit quaternion, finite values and times that rise within a run; nothing
-// is sent but HEARTBEAT, TIMESYNC, SET_MESSAGE_INTERVAL and REQUEST_DATA_STREAM.
+// is sent but HEARTBEAT, TIMESYNC, SET_MESSAGE_INTERVAL, REQUEST_DATA_STREAM and, of a tracker that
+// says anything, estimates whose numbers are finite and status texts.
 #include <mavlink.h>
 
 #include "fuzz.h"
-#include "twoview_drivers/mavlink/session.h"
+#include "twoview_drivers/mavlink/estimate.h"
 
 namespace {
 
@@ -22,7 +23,9 @@ tvs_status send(void*, const void* data, size_t size) {
   FUZZ_REQUIRE(size >= 12 && bytes[0] == MAVLINK_STX);
   const uint32_t id = bytes[7] | bytes[8] << 8 | bytes[9] << 16;
   FUZZ_REQUIRE(id == MAVLINK_MSG_ID_HEARTBEAT || id == MAVLINK_MSG_ID_TIMESYNC ||
-               id == MAVLINK_MSG_ID_COMMAND_LONG || id == MAVLINK_MSG_ID_REQUEST_DATA_STREAM);
+               id == MAVLINK_MSG_ID_COMMAND_LONG || id == MAVLINK_MSG_ID_REQUEST_DATA_STREAM ||
+               id == MAVLINK_MSG_ID_ODOMETRY || id == MAVLINK_MSG_ID_VISION_POSITION_ESTIMATE ||
+               id == MAVLINK_MSG_ID_STATUSTEXT);
   if (id == MAVLINK_MSG_ID_COMMAND_LONG)  // the command lies behind seven floats
     FUZZ_REQUIRE((bytes[10 + 28] | bytes[10 + 29] << 8) == MAV_CMD_SET_MESSAGE_INTERVAL);
   return TVS_OK;
@@ -123,6 +126,43 @@ tvs_status next_frame(void* user, tvs_frame* frame) {
 
 void release_frame(void* user, tvs_frame*) { --static_cast<Vehicle*>(user)->held; }
 
+void send_track(Vehicle* v, tvm_session* session, tvm_estimator* estimator, int64_t now) {
+  fuzz::Bytes* b = v->bytes;
+  tv_odometry_state state{};
+  state.struct_size = sizeof state;
+  state.status = b->whole(0, 4);
+  state.has_pose = b->raw<uint8_t>() < 240;
+  state.segment = b->whole(0, 2);
+  state.scale_source = b->whole(0, 3);
+  state.relocated = b->raw<uint8_t>() > 240;
+  state.has_covariance = b->raw<uint8_t>() < 200;
+  for (int k = 0; k < 3; ++k) state.world_from_cam_t[k] = b->wild(-7, 7);
+  const double mount[9] = {0, 0, 1, 1, 0, 0, 0, 1, 0};
+  for (int k = 0; k < 9; ++k) state.world_from_cam_R[k] = mount[k];
+  if (b->raw<uint8_t>() > 240) state.world_from_cam_R[0] = b->wild(-7, 7);
+  for (int k = 0; k < 6; ++k) state.covariance[7 * k] = std::fabs(b->wild(-12, 7));
+  state.scale_sigma = b->wild(-7, 7);
+  tvm_track track{};
+  track.struct_size = sizeof track;
+  track.state = &state;
+  track.host_ns = now - b->whole(0, 300) * int64_t{1000000};
+  if (b->raw<uint8_t>() > 128) {
+    track.has_previous = 1;
+    for (int k = 0; k < 9; ++k) track.previous_R[k] = mount[k];
+    for (int k = 0; k < 3; ++k) track.previous_t[k] = b->wild(-7, 7);
+  }
+  tvm_estimate e{};
+  e.struct_size = sizeof e;
+  const tvs_status status = tvm_session_send_track(session, estimator, &track, &e);
+  FUZZ_REQUIRE(status == TVS_OK || status == TVS_NONE || status == TVS_ERR_ARGUMENT);
+  if (status == TVS_ERR_ARGUMENT || e.silence != TVM_SILENCE_NONE) return;
+  FUZZ_REQUIRE(fuzz::all_finite(e.position_m, 3) && fuzz::all_finite(e.world_from_body, 4));
+  FUZZ_REQUIRE(fuzz::all_finite(e.velocity_m_s, 3) && fuzz::all_finite(e.rate_rad_s, 3));
+  FUZZ_REQUIRE(fuzz::all_finite(e.pose_covariance, 36));
+  FUZZ_REQUIRE(fuzz::all_finite(e.velocity_covariance, 36));
+  FUZZ_REQUIRE(e.quality >= 0 && e.quality <= 100 && e.reset_counter >= 0);
+}
+
 }  // namespace
 
 int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
@@ -141,12 +181,20 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const tvs_frame_source camera = {sizeof camera, &vehicle, next_frame, release_frame};
   tvs_frame_source frames;
   FUZZ_REQUIRE(tvm_session_frames(session, &camera, &frames) == TVS_OK);
+  tvm_estimator_options estimates;
+  tvm_estimator_options_init(&estimates);
+  estimates.messages = bytes.whole(1, 3);
+  estimates.weak = bytes.whole(0, 1);
+  estimates.world = bytes.whole(0, 1);
+  tvm_estimator estimator;
+  FUZZ_REQUIRE(tvm_estimator_init(&estimator, &estimates) == TVS_OK);
   int64_t now = 0;
   while (bytes.left() > 0) {
     const uint8_t wait = bytes.raw<uint8_t>();
     now += wait < 230 ? wait * 200000 : int64_t{wait - 229} * 200000000;
     const tvs_status status = tvm_session_step(session, now);
     FUZZ_REQUIRE(status == TVS_OK || status == TVS_ERR_IO);
+    if (bytes.raw<uint8_t>() > 200) send_track(&vehicle, session, &estimator, now);
     tvs_frame frame{};
     frame.struct_size = sizeof frame;
     while (frames.next(frames.user, &frame) == TVS_OK) frames.release(frames.user, &frame);

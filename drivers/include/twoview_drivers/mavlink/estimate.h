@@ -53,7 +53,7 @@ typedef enum tvm_silence {
   TVM_SILENCE_NONE = 0,
   /* The map has not begun. */
   TVM_SILENCE_STARTING = 1,
-  /* No pose is known. */
+  /* No pose is known, or none whose numbers are finite. */
   TVM_SILENCE_LOST = 2,
   /* The attitude is known, and the position is that of the frame before. */
   TVM_SILENCE_ROTATION = 3,
