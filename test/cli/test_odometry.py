@@ -411,10 +411,10 @@ class OdometryTest(CliTest):
         focal = result["focal_length"]
         self.assertEqual(list(focal),
                          ["focal_35mm", "pixels", "sigma_percent", "uncertain", "k1", "k2",
-                          "source"])
+                          "k3", "source"])
         self.assertTrue(focal["uncertain"])
         self.assertEqual(focal["source"], "estimated")
-        for name in ("k1", "k2"):  # null, or what a pinhole's few frames leave of it
+        for name in ("k1", "k2", "k3"):  # null, or what a pinhole's few frames leave of it
             self.assertLess(abs(focal[name] or 0), 0.1)
         self.assertGreater(focal["sigma_percent"], 5)
         diagonal = math.hypot(WIDTH, HEIGHT) / math.hypot(36, 24)

@@ -372,7 +372,8 @@ class Reconstruct(cli.CliTest):
             self.assertIn("low_parallax", result["reasons"])
             focal = result["focal_length"]
             self.assertTrue(focal["uncertain"])
-            self.assertEqual((focal["source"], focal["k1"], focal["k2"]), ("estimated", None, None))
+            self.assertEqual([focal[key] for key in ("source", "k1", "k2", "k3")],
+                             ["estimated", None, None, None])
             self.assertGreater(focal["sigma_percent"], 5)
             diagonal = math.hypot(WIDTH, HEIGHT) / math.hypot(36, 24)
             self.assertAlmostEqual(focal["pixels"], focal["focal_35mm"] * diagonal, delta=1e-6)

@@ -214,12 +214,15 @@ nlohmann::ordered_json FilmLens::json() const {
           {"uncertain", is_uncertain},
           {"k1", lens.k1 != 0 ? Json(lens.k1) : Json(nullptr)},
           {"k2", lens.k2 != 0 ? Json(lens.k2) : Json(nullptr)},
+          {"k3", lens.k3 != 0 ? Json(lens.k3) : Json(nullptr)},
           {"source", "estimated"}};
 }
 
 std::string FilmLens::words() const {
   char text[160], of_lens[64] = "";
-  if (lens.k1 != 0) std::snprintf(of_lens, sizeof of_lens, ", k1 %.3f, k2 %.3f", lens.k1, lens.k2);
+  if (lens.k1 != 0)
+    std::snprintf(of_lens, sizeof of_lens, ", k1 %.3f, k2 %.3f, k3 %.3f", lens.k1, lens.k2,
+                  lens.k3);
   std::snprintf(text, sizeof text, "focal length %.3g mm (35 mm equivalent) +- %.1f %%%s",
                 focal_35mm(), 100 * sigma, of_lens);
   return text;

@@ -22,7 +22,7 @@ struct FilmLens {
   double focal_35mm() const { return focal_35mm_of(lens.focal_px, width, height); }
   // The key focal_length of result.json.
   nlohmann::ordered_json json() const;
-  // "27.3 mm (35 mm equivalent) +- 0.5 %", with k1 and k2 where a map told them.
+  // "27.3 mm (35 mm equivalent) +- 0.5 %", with the coefficients where a map told them.
   std::string words() const;
 };
 

@@ -9,10 +9,11 @@
 namespace cli {
 namespace {
 
-// The parameters that all windows share: the logarithm of the focal length, the lens's two
-// coefficients, the principal point's distance from the middle of the picture over the focal
-// length, and the time from the picture's first row to its last over that between two frames.
-enum Parameter { kFocal, kK1, kK2, kCx, kCy, kReadout, kParameters };
+// The parameters that all windows share: the logarithm of the focal length, the lens's three
+// radial and two tangential coefficients, the principal point's distance from the middle of the
+// picture over the focal length, and the time from the picture's first row to its last over that
+// between two frames.
+enum Parameter { kFocal, kK1, kK2, kK3, kP1, kP2, kCx, kCy, kReadout, kParameters };
 using Lens = cv::Matx<double, kParameters, 1>;
 using LensMatrix = cv::Matx<double, kParameters, kParameters>;
 
@@ -64,24 +65,25 @@ cv::Matx33d exp_of(const Vec3& w) {
   return cv::Matx33d::eye() + a * W + b * (W * W);
 }
 
-// The distance from the middle at the slope `rho`, over the focal length, and its slope by rho, k1
-// and k2. False where the lens shows no such ray.
-bool bend(double rho, const Lens& lens, double* d, double slopes[3]) {
+// The distance from the middle at the slope `rho`, over the focal length, and its slopes by rho,
+// k1, k2 and k3. False where the lens shows no such ray.
+bool bend(double rho, const Lens& lens, double* d, double slopes[4]) {
   constexpr int kMostSteps = 20;
-  const double k1 = lens(kK1), k2 = lens(kK2);
+  const double k1 = lens(kK1), k2 = lens(kK2), k3 = lens(kK3);
   const double inside = 1 - 4 * k1 * rho * rho;
-  if (!(inside > 0.01)) return false;
-  double at = 2 * rho / (1 + std::sqrt(inside));
+  double at = inside > 0.01 ? 2 * rho / (1 + std::sqrt(inside)) : rho;
   for (int step = 0; step < kMostSteps; ++step) {
-    const double sq = at * at, bent = 1 + k1 * sq + k2 * sq * sq;
-    const double falls = 1 - k1 * sq - 3 * k2 * sq * sq;  // bent^2 times the slope of at / bent
+    const double sq = at * at, bent = 1 + sq * (k1 + sq * (k2 + sq * k3));
+    // bent^2 times the slope of at / bent
+    const double falls = 1 - sq * (k1 + sq * (3 * k2 + sq * 5 * k3));
     if (!(bent > 0.05) || !(falls > 0.05)) return false;
     const double error = at - rho * bent;
     slopes[0] = bent * bent / falls;
     slopes[1] = at * sq / falls;
     slopes[2] = slopes[1] * sq;
+    slopes[3] = slopes[2] * sq;
     *d = at;
-    if (k2 == 0 || std::fabs(error) < 1e-9) return true;
+    if (std::fabs(error) < 1e-9) return true;
     at -= error * bent / falls;
   }
   return false;
@@ -99,15 +101,20 @@ bool project(const Lens& lens, const View& view, const Vec3& in_camera, double r
   const double f = std::exp(lens(kFocal)), inverse = 1 / x(2);
   const Vec2 slope(x(0) * inverse, x(1) * inverse);
   const double rho = cv::norm(slope);
-  double d, slopes[3];
+  double d, slopes[4];
   if (!bend(rho, lens, &d, slopes)) return false;
   const bool is_middle = rho < 1e-9;
   const double s = is_middle ? 1 : d / rho;
-  *pixel = f * (s * slope + Vec2(lens(kCx), lens(kCy)));
+  const double u = slope(0), v = slope(1), p1 = lens(kP1), p2 = lens(kP2);
+  const Vec2 by_p1(2 * u * v, rho * rho + 2 * v * v), by_p2(rho * rho + 2 * u * u, 2 * u * v);
+  *pixel = f * (s * slope + p1 * by_p1 + p2 * by_p2 + Vec2(lens(kCx), lens(kCy)));
   if (!by_point) return true;
   const Vec2 away = is_middle ? Vec2(0, 0) : (1 / rho) * slope;
-  const cv::Matx22d by_slope =
-      f * (s * cv::Matx22d::eye() + (is_middle ? 0 : slopes[0] - s) * (away * away.t()));
+  const double across = 2 * (p1 * u + p2 * v);
+  const cv::Matx22d tangential(2 * p1 * v + 6 * p2 * u, across, across, 6 * p1 * v + 2 * p2 * u);
+  const cv::Matx22d radial =
+      s * cv::Matx22d::eye() + (is_middle ? 0 : slopes[0] - s) * (away * away.t());
+  const cv::Matx22d by_slope = f * (radial + tangential);
   const Matx23 by_x =
       by_slope * Matx23(inverse, 0, -slope(0) * inverse, 0, inverse, -slope(1) * inverse);
   const Vec2 by_readout = by_x * (row * moving);
@@ -116,6 +123,9 @@ bool project(const Lens& lens, const View& view, const Vec3& in_camera, double r
     (*by_lens)(r, kFocal) = (*pixel)(r);
     (*by_lens)(r, kK1) = f * slopes[1] * away(r);
     (*by_lens)(r, kK2) = f * slopes[2] * away(r);
+    (*by_lens)(r, kK3) = f * slopes[3] * away(r);
+    (*by_lens)(r, kP1) = f * by_p1(r);
+    (*by_lens)(r, kP2) = f * by_p2(r);
     (*by_lens)(r, kCx) = r == 0 ? f : 0;
     (*by_lens)(r, kCy) = r == 1 ? f : 0;
     (*by_lens)(r, kReadout) = by_readout(r);
@@ -452,7 +462,8 @@ Lens prior_sigmas(int width, int height, double focal_px) {
   // away from its middle. A rolling shutter takes up to the whole time between two frames.
   constexpr double kPriorCentre = 0.02, kPriorReadout = 0.5;
   const double centre = kPriorCentre * std::hypot(width, height) / focal_px;
-  return {kPriorLogFocal, kPriorK1, kPriorK2, centre, centre, kPriorReadout};
+  return {kPriorLogFocal, kPriorK, kPriorK, kPriorK,      kPriorP,
+          kPriorP,        centre,  centre,  kPriorReadout};
 }
 
 // Levenberg-Marquardt over the windows and the lens that they share.
@@ -465,10 +476,16 @@ class Adjustment {
   const Lens& lens() const { return lens_; }
   double cost() const { return cost_; }
   double noise_sq() const { return noise_sq_; }
+  size_t num_observations() const {
+    size_t count = 0;
+    for (const Window& window : windows_)
+      for (const Point& point : window.points) count += point.seen.size();
+    return count;
+  }
 
   void minimise(int most_steps) {
     constexpr double kSmallMove = 2e-4, kUndamped = 1e-4, kMostDamping = 1e3, kLeastDamping = 1e-8;
-    const Lens longest(0.2, 0.1, 0.1, 0.05, 0.05, 0.3);
+    const Lens longest(0.2, 0.1, 0.1, 0.1, 0.005, 0.005, 0.05, 0.05, 0.3);
     double damping = 1e-4, growth = 2;
     bool is_fresh = false;
     for (int step = 0; step < most_steps && !windows_.empty(); ++step) {
@@ -577,13 +594,17 @@ class Adjustment {
 };
 
 // The variance of the log of the focal length by what it costs to hold another one. Where a camera
-// moves without turning, the slopes at the optimum are of noise and promise more than is known.
+// moves without turning, the slopes at the optimum are of noise and promise more than is known. So
+// does their number: what bends all observations alike by a hundredth of their sigma does not
+// average out, and such a camera shows no more of a focal length that is 10 per cent off.
 double variance_by_cost(const Adjustment& best) {
-  constexpr double kAway = 0.1;
+  constexpr double kAway = 0.1, kAlike = 0.01;
   constexpr int kSteps = 20;
   const double least =
       std::min(best.cost_away(-kAway, kSteps), best.cost_away(kAway, kSteps)) - best.cost();
-  const double chi2 = std::max(least, 0.0) / (kSharedErrors * best.noise_sq());
+  const double of_chance = kSharedErrors * best.noise_sq();
+  const double alike = kAlike * kAlike * static_cast<double>(best.num_observations());
+  const double chi2 = std::max(least, 0.0) / (of_chance + alike);
   constexpr double kPriorVariance = kPriorLogFocal * kPriorLogFocal;
   return 1 / (chi2 / (kAway * kAway) + 1 / kPriorVariance);
 }
@@ -605,13 +626,17 @@ LensEstimate adjust_lens(const std::vector<LensKeyframe>& keyframes,
   if (num_views < kLeastKeyframes) return estimate;
   const double prior_px = focal_px_of(kPriorFocal35mm, width, height), f = start.focal_px;
   Adjustment adjustment(std::move(windows),
-                        {std::log(f), start.k1, start.k2, start.cx / f, start.cy / f, 0},
-                        {std::log(prior_px), 0, 0, 0, 0, 0}, prior_sigmas(width, height, prior_px));
+                        {std::log(f), start.k1, start.k2, start.k3, start.p1, start.p2,
+                         start.cx / f, start.cy / f, 0},
+                        {std::log(prior_px), 0, 0, 0, 0, 0, 0, 0, 0},
+                        prior_sigmas(width, height, prior_px));
   adjustment.minimise(kMostSteps);
   const double variance = adjustment.focal_variance();
   const Lens& lens = adjustment.lens();
   const double focal_px = std::exp(lens(kFocal));
-  estimate.lens = {focal_px, lens(kK1), lens(kK2), focal_px * lens(kCx), focal_px * lens(kCy)};
+  estimate.lens = {
+      focal_px,  lens(kK1), lens(kK2), lens(kK3), focal_px * lens(kCx), focal_px * lens(kCy),
+      lens(kP1), lens(kP2)};
   if (variance < kPriorVariance)
     estimate.focal_variance = std::max(variance, variance_by_cost(adjustment));
   estimate.is_known = true;

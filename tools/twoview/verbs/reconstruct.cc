@@ -112,7 +112,7 @@ void add_estimated_focal_length(const Outcome& outcome, nlohmann::ordered_json& 
   focal["pixels"] = pixels * outcome.picture[0].file_width / start.width;
   focal["sigma_percent"] = 100 * sigma;
   focal["uncertain"] = sigma > kMostFocalSigma;
-  focal["k1"] = focal["k2"] = nullptr;
+  focal["k1"] = focal["k2"] = focal["k3"] = nullptr;
   focal["source"] = "estimated";
 }
 
