@@ -7,8 +7,12 @@ import io
 import json
 import math
 import os
+import shutil
+import signal
+import sqlite3
 import subprocess
 import sys
+import time
 import unittest
 from pathlib import Path
 
@@ -452,6 +456,46 @@ class Import(BagTest):
         for i, (time, _) in enumerate(numbers(self.out / "frames.txt")):
             index = (int(time.replace(".", "")) - T0) // STEP
             self.assertTrue((self.picture(i) == grey(index, 64, 64)).all())
+
+    def test_a_recording_that_was_killed_and_one_without_definitions_are_read(self):
+        """sqlite3 of ROS 2 before Jazzy has no table of definitions, and a killed one a journal."""
+        bag = self.bag(lambda make: [*pictures(make), info(make)], "sqlite3")
+        file, = bag.glob("*.db3")
+        with contextlib.closing(sqlite3.connect(file)) as database:
+            database.execute("DROP TABLE message_definitions")
+            database.execute("PRAGMA journal_mode=WAL")
+            database.execute("INSERT INTO messages(topic_id, timestamp, data) SELECT topic_id, "
+                             "timestamp, data FROM messages WHERE topic_id = 2")
+            database.commit()
+            killed = self.new()
+            for path in bag.glob("*.db3*"):
+                shutil.copy(path, killed)
+        self.assertTrue(any(path.stat().st_size for path in killed.glob("*-wal")))
+        for source in (killed, killed / file.name):
+            summary = self.imported(source)
+            self.assertEqual((summary["num_frames"], summary["topics"]["camera_info"]),
+                             (5, "/cam/camera_info"))
+        rows = json.loads(self.run_here("import", killed, "--list", "--json").stdout)["topics"]
+        self.assertEqual(rows[0]["count"], 2)  # one of them in the journal
+
+    def test_a_signal_leaves_nothing(self):
+        def messages(make):
+            for i in range(400):
+                ns = T0 + i * STEP
+                yield "/a", ns, make.image(ns, grey(i % 9, 400, 300).tobytes(), 300, 400)
+
+        bag = self.bag(messages)
+        self.out = self.new() / "set"
+        started = subprocess.Popen([program(), "import", str(bag), "-o", str(self.out)],
+                                   env={**os.environ, "TWOVIEW_PYTHON": sys.executable},
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        while started.poll() is None and not os.listdir(self.out.parent):
+            time.sleep(0.002)
+        started.send_signal(signal.SIGTERM)
+        started.communicate(timeout=60)
+        if started.returncode != 0:  # it had not ended before the signal came
+            self.assertEqual(started.returncode, -signal.SIGTERM)
+            self.assertEqual(os.listdir(self.out.parent), [])
 
     # -- bad input ----------------------------------------------------------------------------
 

@@ -501,8 +501,8 @@ def new_folder(folder):
         raise BadInput(f"cannot write {folder}: it is a file")
     parent, name = os.path.split(folder)
     temporary = os.path.join(parent, f".{name}.{os.getpid()}")
-    os.makedirs(temporary)
     try:
+        os.makedirs(temporary)
         yield temporary
         if os.path.isdir(folder):
             os.rmdir(folder)

@@ -26,6 +26,7 @@ import zstandard
 from mcap import exceptions as mcap_errors
 from mcap import opcode, records, stream_reader
 from mcap import reader as mcap_reader
+from mcap.data_stream import ReadDataStream
 
 from ..folders import natural_key
 from . import BadInput, counted
@@ -142,6 +143,7 @@ class Ros1File:
     def messages(self, wanted):
         """As Bag.messages. Raises _Cut."""
         connections = {}
+        buffer = bytearray(1 << 20)
         with open(self.path, "rb") as file:
             size = os.fstat(file.fileno()).st_size
             file.readline()
@@ -152,8 +154,14 @@ class Ros1File:
                     is_whole = file.tell() + length <= size
                     op = fields[b"op"]
                     if op == b"\x05":
+                        # The same memory for each chunk: new memory of this size costs more time
+                        # than the reading.
+                        num_bytes = min(length, size - file.tell())
+                        if num_bytes > len(buffer):
+                            buffer = bytearray(num_bytes)
+                        chunk = memoryview(buffer)[:num_bytes]
                         chunk = _uncompressed(fields[b"compression"].decode("ascii", "replace"),
-                                              file.read(length))
+                                              chunk[:file.readinto(chunk)])
                         yield from self._of_chunk(memoryview(chunk), connections, wanted)
                     elif op in (b"\x02", b"\x07") and is_whole:  # not in a chunk
                         yield from self._message(fields, file.read(length), connections, wanted)
@@ -194,6 +202,21 @@ class Ros1File:
 
 # ---- MCAP ----------------------------------------------------------------------------------------
 
+MCAP_MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log and publish time; the data follows
+MCAP_DESCRIPTIONS = {opcode.Opcode.SCHEMA: records.Schema, opcode.Opcode.CHANNEL: records.Channel}
+
+
+def _mcap_records(chunk):
+    """(opcode, body) of each whole record in the bytes of a chunk, without copying them."""
+    at, size = 0, len(chunk)
+    while at + 9 <= size:
+        end = at + 9 + int.from_bytes(chunk[at + 1:at + 9], "little")
+        if end > size:
+            return
+        yield chunk[at], chunk[at + 9:end]
+        at = end
+
+
 class McapFile:
     """An MCAP file, by itself or in the folder of a ROS 2 bag."""
 
@@ -212,30 +235,31 @@ class McapFile:
         return Topic(channel.topic, full_type(schema.name), channel.message_encoding, text,
                      schema.encoding)
 
-    def _of_chunk(self, chunk):
-        """Its records; none where it is damaged, which `damaged` counts."""
+    def _whole(self, chunk):
+        """The bytes of a chunk; none where they are damaged, which `damaged` counts."""
         try:
-            return stream_reader.breakup_chunk(chunk, validate_crc=True)
+            stream, size = stream_reader.get_chunk_data_stream(chunk, validate_crc=True)
+            return stream.read(size)
         except self._ENDS:
             self.damaged += 1
-            return ()
+            return b""
 
-    def _of_cut_chunk(self, file, at):
-        """The records of the chunk that begins at this byte, as far as its bytes go."""
+    def _cut_chunk(self, file, at):
+        """The bytes of the chunk that begins at this byte, as far as they go."""
         file.seek(at)
         head = file.read(9)
         if len(head) < 9 or head[0] != opcode.Opcode.CHUNK:
-            return
+            return b""
         data = file.read()
         with contextlib.suppress(*self._ENDS):
             name_bytes, = struct.unpack_from("<I", data, 28)
             name, body = data[32:32 + name_bytes], data[40 + name_bytes:]
             if name == b"zstd":
-                body = zstandard.ZstdDecompressor().decompressobj().decompress(body)
-            elif name == b"lz4":
-                body = lz4.frame.LZ4FrameDecompressor().decompress(body)
-            yield from stream_reader.StreamReader(BytesIO(body), skip_magic=True,
-                                                  record_size_limit=len(body)).records
+                return zstandard.ZstdDecompressor().decompressobj().decompress(body)
+            if name == b"lz4":
+                return lz4.frame.LZ4FrameDecompressor().decompress(body)
+            return body
+        return b""
 
     def topics(self):
         """[Topic] by the summary at the file's end; None where there is none."""
@@ -251,22 +275,27 @@ class McapFile:
         """As Bag.messages. Raises _Cut."""
         schemas, channels = {}, {}
         self.damaged = 0
+
+        def take(record):
+            if isinstance(record, records.Schema):
+                schemas[record.id] = record
+            elif isinstance(record, records.Channel):
+                topic = self._topic(record, schemas.get(record.schema_id))
+                is_wanted = wanted is None or topic.name in wanted
+                channels[record.id] = topic if is_wanted else None
+
+        def messages(chunk):
+            for code, body in _mcap_records(memoryview(chunk)):
+                if code == opcode.Opcode.MESSAGE:
+                    channel, _, log_time, _ = MCAP_MESSAGE.unpack_from(body)
+                    if (topic := channels[channel]) is not None:
+                        yield topic, log_time, body[MCAP_MESSAGE.size:]
+                elif code in MCAP_DESCRIPTIONS:
+                    take(MCAP_DESCRIPTIONS[code].read(ReadDataStream(BytesIO(body))))
+
         with open(self.path, "rb") as file:
             size = os.fstat(file.fileno()).st_size
             at = 0
-
-            def messages(inner):
-                for one in inner:
-                    if isinstance(one, records.Message):
-                        if (topic := channels[one.channel_id]) is not None:
-                            yield topic, one.log_time, one.data
-                    elif isinstance(one, records.Schema):
-                        schemas[one.id] = one
-                    elif isinstance(one, records.Channel):
-                        topic = self._topic(one, schemas.get(one.schema_id))
-                        is_wanted = wanted is None or topic.name in wanted
-                        channels[one.id] = topic if is_wanted else None
-
             try:
                 for record in stream_reader.StreamReader(file, emit_chunks=True,
                                                          record_size_limit=size).records:
@@ -274,13 +303,18 @@ class McapFile:
                         if self.damaged:
                             raise _Cut(f"in {counted(self.damaged, 'chunk')}")
                         return
-                    is_chunk = isinstance(record, records.Chunk)
-                    yield from messages(self._of_chunk(record) if is_chunk else (record,))
+                    if isinstance(record, records.Chunk):
+                        yield from messages(self._whole(record))
+                    elif isinstance(record, records.Message):
+                        if (topic := channels[record.channel_id]) is not None:
+                            yield topic, record.log_time, record.data
+                    else:
+                        take(record)
                     at = file.tell()
             except (*self._ENDS, KeyError):
                 pass
-            with contextlib.suppress(KeyError):
-                yield from messages(self._of_cut_chunk(file, at))
+            with contextlib.suppress(KeyError, struct.error):
+                yield from messages(self._cut_chunk(file, at))
             raise _Cut(_bytes_words(at, size))
 
 
