@@ -189,6 +189,13 @@ def test_what_is_left_out_is_named(tmp_path):
         "left out: P (of rectified pictures), weather"]
 
 
+def test_four_coefficients_without_a_model_are_named(tmp_path):
+    head = "image_width: 640\nimage_height: 480\nK: [500, 0, 320, 0, 510, 240, 0, 0, 1]\n"
+    (tmp_path / "c").write_text(head + "D: [[0.1], [0.02], [-0.03], [0.01]]\n")
+    with pytest.warns(tv.CameraFileWarning, match="D as a fisheye's k1 k2 k3 k4"):
+        assert tv.read_camera(tmp_path / "c").model == tv.CameraModel.BROWN_CONRADY
+
+
 # ---- bad input -----------------------------------------------------------------------------------
 
 @pytest.mark.parametrize("text, words", [
@@ -199,7 +206,7 @@ def test_what_is_left_out_is_named(tmp_path):
     ("<opencv_storage><a>1</a><a>2</a></opencv_storage>", "a is given twice"),
     ("a: &x 1\nb: *x\n", "aliases"),
     ("1 PINHOLE 8 8 5 5 4 4\n1 PINHOLE 8 8 5 5 4 4\n", "camera 1 is given twice"),
-    ("\x00\x01", "no YAML"),
+    ("\x00\x01", "a binary file"),
     ("x" * (1 << 20) + "x", "larger than"),
 ])
 def test_files_that_are_refused(tmp_path, text, words):

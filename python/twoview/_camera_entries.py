@@ -76,10 +76,10 @@ _SUSPECT = re.compile(
     "shape|dimension|intrinsic|principal|scale|crop|zoom|omni|mirror|model|matrix|rectif|prism|"
     "division|project|stretch|optic|pixel|cameratype|cameramat")
 _SUSPECT_WHOLE = re.compile(
-    "f|fx|fy|cx|cy|fu|fv|cu|cv|u0|v0|mu|mv|ppx|ppy|flx|fly|w|h|k|d|p|r|s|c|e|m|xi|alpha|beta|gamma|"
-    "[kpsbdmar][0-9]+|ks|ps|tau[xy]?|tx|ty|poly[0-9]*|invpol.*|[hvd]?fov|cols|rows|mtx|type")
+    "f|fx|fy|cx|cy|fu|fv|cu|cv|u0|v0|mu|mv|ppx|ppy|flx|fly|w|h|k|d|p|r|s|a|b|c|e|m|xi|alpha|beta|"
+    "gamma|[kpsbdmar][0-9]+|ks|ps|tau[xy]?|tx|ty|poly[0-9]*|invpol.*|[hvd]?fov|cols|rows|mtx|type")
 # Of these a value of 0 says that there is none.
-_ZERO_IS_NONE = re.compile("[kpsb][0-9]+|skew|tau[xy]?|tx|ty|radial|tangential|xi")
+_ZERO_IS_NONE = re.compile("[kpsb][0-9]+|[abc]|skew|tau[xy]?|tx|ty|radial|tangential|xi")
 
 FARTHEST_CENTER = 1.0  # image sides that the principal point may lie outside the image
 SHORTEST_FOCAL = 0.02  # of the image's side: 176 degrees of a pinhole; below it is another unit
@@ -454,7 +454,8 @@ def _padded(values: Sequence[float]) -> list[float]:
     return list(values) + [0.0] * (max(OPENCV_COUNTS) - len(values))
 
 
-def _distortion(entries: Entries, kind: str, by: str) -> tuple[CameraModel, list[float]]:
+def _distortion(entries: Entries, kind: str, by: str,
+                left_out: list[str]) -> tuple[CameraModel, list[float]]:
     """The lens and its coefficients; `by` is the entry that says that the lens is a `kind`."""
     where = entries.where
     is_fisheye = kind == FISHEYE_LENS
@@ -482,6 +483,10 @@ def _distortion(entries: Entries, kind: str, by: str) -> tuple[CameraModel, list
             raise FormatError(f"{where}: {entry} has {len(k)} numbers, of which {entry}[{i}] is "
                               "not 0: the lens models here end with the first 8 (no thin prism, no "
                               "tilted sensor); calibrate with 5 or 8")
+    # cv2.fisheye has four coefficients as well, and its users save them without a model's name.
+    if kind == PINHOLE and vector is not None and len(k) == 4 and any(k):
+        left_out.append(f"{entry} as a fisheye's k1 k2 k3 k4 (4 numbers without a distortion_model "
+                        "are k1 k2 p1 p2)")
     return (CameraModel.KANNALA_BRANDT if is_fisheye else CameraModel.BROWN_CONRADY,
             k[:NUM_MODELLED])
 
@@ -542,7 +547,7 @@ def take_camera(entries: Entries, left_out: list[str]) -> Camera:
     kind, by = _model(entries)
     size = _size(entries)
     K = _pinhole(entries)
-    lens, k = _distortion(entries, kind, by)
+    lens, k = _distortion(entries, kind, by, left_out)
     roi = _roi(entries)
     left_out += _rectified(entries, K)
     refused, more = entries.judged()

@@ -302,21 +302,24 @@ def _orb_slam(root: Mapping[str, Any], name: str, read: _Read) -> bool:
 
 def _vins(root: Mapping[str, Any], name: str, read: _Read) -> bool:
     """VINS's camera files (camodocal): the model's name, and maps of its parameters."""
-    if "model_type" not in root or not {"projection_parameters", "mirror_parameters"} & set(root):
+    if "model_type" not in root or not {"projection_parameters", "mirror_parameters",
+                                        "poly_parameters"} & set(root):
         return False
     word = word_of(root["model_type"], "model_type", name)
     values = {entry: value for entry, value in root.items()
               if entry != "fisheye" and not _OTHER_SETTINGS.fullmatch(entry)}
-    if word == "KANNALA_BRANDT":  # its k2 to k5 are of theta^3 to theta^9; mu, mv are fx, fy
+    if plain(word) == "kannalabrandt":  # its k2 to k5 are of theta^3 to theta^9; mu, mv are fx, fy
         names = {"k2": "k1", "k3": "k2", "k4": "k3", "k5": "k4", "mu": "fx", "mv": "fy", "u0": "cx",
                  "v0": "cy"}
         inner = values.get("projection_parameters")
         if isinstance(inner, dict):
             values["projection_parameters"] = {names.get(key, f"?{key}"): item
                                                for key, item in inner.items()}
-    elif word != "PINHOLE":
+    elif plain(word) in ("pinhole", "pinholefull"):
+        del values["model_type"]  # PINHOLE_FULL has k4, k5, k6
+    else:
         raise FormatError(f"{name}: VINS's model_type '{word[:40]}' is not one of PINHOLE, "
-                          "KANNALA_BRANDT: no lens here is that")
+                          "PINHOLE_FULL, KANNALA_BRANDT: no lens here is that")
     read.add("", values, name)
     return True
 
@@ -334,7 +337,9 @@ def _nerfstudio(root: Mapping[str, Any], name: str, read: _Read) -> bool:
         return False
     if "fl_y" not in root:
         root = {**root, "fl_y": root["fl_x"]}
-    if root.get("camera_model") not in ("OPENCV_FISHEYE", "FISHEYE"):
+    flag = word_of(root.get("is_fisheye"), "is_fisheye", name)  # instant-ngp's
+    if (root.get("camera_model") not in ("OPENCV_FISHEYE", "FISHEYE")
+            and plain(flag) not in ("true", "1")):
         k4 = root.get("k4")
         if k4 is not None and number_of(k4, "k4", name) != 0:
             raise FormatError(f"{name}: k4 is not 0, and no lens here has nerfstudio's k4")
@@ -372,6 +377,18 @@ def _refuse_by_name(root: Mapping[str, Any], name: str) -> None:
         raise FormatError(f"{name}: {other}; {_WRITE_OURS}")
 
 
+def _refuse_binary(text: str, name: str) -> None:
+    """Refuses what is no text: archives of numpy, databases, pickles, COLMAP's .bin."""
+    what = ("a zip archive, as numpy's .npz" if text.startswith("PK\x03\x04") else
+            "a database, as COLMAP's" if text.startswith("SQLite format 3") else
+            "text in UTF-16: save it as UTF-8"
+            if text.startswith(("\udcff\udcfe", "\udcfe\udcff")) else
+            "compressed: unpack it" if text.startswith("\x1f\udc8b") else
+            "a binary file, no text" if "\0" in text else "")
+    if what:
+        raise FormatError(f"{name}: {what}{KNOWN}")
+
+
 def _refuse_text_by_name(text: str, name: str) -> None:
     """Refuses the text files of other programs, with what to do."""
     first = next((line.split() for line in text.split("\n") if line.strip()), [])
@@ -385,9 +402,10 @@ def _refuse_text_by_name(text: str, name: str) -> None:
     is_dso = bool(first) and first[0] in ("Pinhole", "RadTan", "FOV", "EquiDistant", "ATAN",
                                           "KannalaBrandt")
     numbers = [word for word in first if re.fullmatch(r"[-+0-9.eE]+", word)]
-    if is_dso and len(first) > 1 or len(first) >= 4 and len(numbers) == len(first):
-        raise FormatError(f"{name}: a camera of DSO, LSD-SLAM or PTAM (tum_ardrone), whose numbers "
-                          "may be relative to the picture's size; " + _WRITE_OURS)
+    if is_dso and len(first) > 1 or len(first) >= 3 and len(numbers) == len(first):
+        raise FormatError(f"{name}: numbers without names: a matrix alone, or a camera of DSO, "
+                          "LSD-SLAM or PTAM (tum_ardrone), whose numbers may be relative to the "
+                          "picture's size; " + _WRITE_OURS)
 
 
 def _svo(root: Mapping[str, Any], name: str, read: _Read) -> bool:
@@ -437,6 +455,7 @@ def _read_file(text: str, name: str) -> _Read:
     if _is_colmap(text):
         read.cameras = _colmap_cameras(text, name)
         return read
+    _refuse_binary(text, name)
     _refuse_text_by_name(text, name)
     root = _root_of(text, name)
     if is_camera(root) and "fl_x" not in root and "model_type" not in root:
@@ -449,6 +468,10 @@ def _read_file(text: str, name: str) -> _Read:
     if any(known(root, name, read) for known in (_orb_slam, _vins, _nerfstudio, _svo)):
         return read
     _refuse_by_name(root, name)
+    if "cam0_calib" in root:
+        file = word_of(root["cam0_calib"], "cam0_calib", name)
+        raise FormatError(f"{name}: VINS's settings, whose cameras are in files of their own: give "
+                          f"{file[:80]} (cam0_calib)")
     if _named(root, name, read):
         return read
     refused = Entries(root, name).missing("camera_matrix")

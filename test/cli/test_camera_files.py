@@ -195,6 +195,15 @@ class CameraFiles(cli.CliTest):
                 self.assertIn(b"left out: weather", done.stdout)
                 self.assertNotIn(b"board_width", done.stdout)
 
+    def test_four_coefficients_without_a_model_are_named(self):
+        lens = (camera_yaml().partition("distortion_coefficients")[0]
+                + "dist_coeffs: [[0.1], [0.02], [-0.003], [0.001]]\n")
+        for more, is_named in (("", True), ("distortion_model: plumb_bob\n", False)):
+            camera = self.write("c.yaml", lens + more)
+            done = self.run_program("undistort", self.a, "--camera", camera, "-o", self.out)
+            self.succeed(done)
+            self.assertEqual(b"dist_coeffs as a fisheye's k1 k2 k3 k4" in done.stdout, is_named)
+
     def test_a_camera_of_another_size_is_scaled_where_the_user_says_so(self):
         large = self.write("large.yaml", camera_yaml(
             width=2 * WIDTH, height=2 * HEIGHT, fx=2 * cli.FOCAL, fy=2 * cli.FOCAL,

@@ -12,7 +12,7 @@ from test_bad_input import JPEG
 
 FOCAL_35MM = 32  # a whole number, as EXIF has it
 FOCAL_PX = FOCAL_35MM * math.hypot(WIDTH, HEIGHT) / math.hypot(36, 24)
-SHORT, LONG, RATIONAL = 3, 4, 5
+SHORT, LONG, RATIONAL, SRATIONAL, FLOAT, DOUBLE = 3, 4, 5, 10, 11, 12
 
 
 def exif(order="<", orientation=None, **tags):
@@ -28,6 +28,14 @@ def exif(order="<", orientation=None, **tags):
         if kind == RATIONAL:
             field = struct.pack(order + "I", data_at + len(extra))
             extra += struct.pack(order + "II", *value)
+        elif kind == SRATIONAL:
+            field = struct.pack(order + "I", data_at + len(extra))
+            extra += struct.pack(order + "ii", *value)
+        elif kind == DOUBLE:
+            field = struct.pack(order + "I", data_at + len(extra))
+            extra += struct.pack(order + "d", value)
+        elif kind == FLOAT:
+            field = struct.pack(order + "f", value)
         elif kind == SHORT:
             field = struct.pack(order + "HH", value, 0)
         else:
@@ -181,6 +189,16 @@ class Exif(cli.CliTest):
         # --focal-sigma comes before what EXIF says.
         self.succeed(self.reconstruct("--focal-sigma", "0", camera=False))
         self.assertIsNone(self.result()["focal_length"])
+
+    def test_a_digital_zoom_of_another_type_than_the_standards_counts_too(self):
+        for order in "<>":  # Pillow writes a float as DOUBLE
+            for kind, value in ((DOUBLE, 1.6), (FLOAT, 1.6), (SRATIONAL, (16, 10))):
+                image = self.write("z.png", with_exif(self.a.read_bytes(), exif(
+                    order, **film(20), zoom=(0xA404, kind, value))))
+                with self.subTest(order=order, kind=kind):
+                    done = self.run_program("undistort", image, "-o", self.out)
+                    self.assert_refused(done, "--focal-35mm")
+                    self.assertNotIn(b"20 (by EXIF)", done.stderr)  # it may be 20 mm, or 32
 
     def test_what_two_readings_of_the_focal_length_mean_together(self):
         of_film = math.hypot(36, 24) / math.hypot(36, 27)  # of 4:3, as the images are

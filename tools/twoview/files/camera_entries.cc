@@ -216,14 +216,15 @@ constexpr const char* kSuspect[] = {
     "division", "project", "stretch",   "optic",     "pixel",     "cameratype", "cameramat"};
 const std::regex& suspect_whole() {
   static const std::regex names(
-      "f|fx|fy|cx|cy|fu|fv|cu|cv|u0|v0|mu|mv|ppx|ppy|flx|fly|w|h|k|d|p|r|s|c|e|m|xi|alpha|beta|"
-      "gamma|[kpsbdmar][0-9]+|ks|ps|tau[xy]?|tx|ty|poly[0-9]*|invpol.*|[hvd]?fov|cols|rows|mtx|"
+      "f|fx|fy|cx|cy|fu|fv|cu|cv|u0|v0|mu|mv|ppx|ppy|flx|fly|w|h|k|d|p|r|s|a|b|c|e|m|xi|alpha|"
+      "beta|gamma|[kpsbdmar][0-9]+|ks|ps|tau[xy]?|tx|ty|poly[0-9]*|invpol.*|[hvd]?fov|cols|rows|"
+      "mtx|"
       "type");
   return names;
 }
 // Of these a value of 0 says that there is none.
 const std::regex& zero_is_none() {
-  static const std::regex names("[kpsb][0-9]+|skew|tau[xy]?|tx|ty|radial|tangential|xi");
+  static const std::regex names("[kpsb][0-9]+|[abc]|skew|tau[xy]?|tx|ty|radial|tangential|xi");
   return names;
 }
 
@@ -497,7 +498,8 @@ bool agree(std::vector<double> a, std::vector<double> b) {
   return a == b;
 }
 
-void read_distortion(CameraEntries& entries, const Said& said, tv_camera& camera) {
+void read_distortion(CameraEntries& entries, const Said& said, tv_camera& camera,
+                     std::vector<std::string>& left_out) {
   const std::string& where = entries.where();
   const bool is_fisheye = said.lens == Lens::kFisheye;
   const bool is_kalibrs = entries.has({"distortion_coeffs"});
@@ -528,6 +530,12 @@ void read_distortion(CameraEntries& entries, const Said& said, tv_camera& camera
                    "] is not 0: the lens models here end with the first 8 (no thin prism, no "
                    "tilted sensor); calibrate with 5 or 8");
   }
+  // cv2.fisheye has four coefficients as well, and its users save them without a model's name.
+  if (said.lens == Lens::kAny && vector && k.size() == 4 &&
+      std::any_of(k.begin(), k.end(), [](double v) { return v != 0; }))
+    left_out.push_back(vector->entry +
+                       " as a fisheye's k1 k2 k3 k4 (4 numbers without a distortion_model are "
+                       "k1 k2 p1 p2)");
   std::copy_n(k.begin(), std::min(k.size(), kModelled), camera.k);
   camera.model = is_fisheye ? TV_CAMERA_KANNALA_BRANDT : TV_CAMERA_BROWN_CONRADY;
 }
@@ -677,7 +685,7 @@ tv_camera take_camera(CameraEntries& entries, std::vector<std::string>& left_out
   camera.fy = K[1];
   camera.cx = K[2];
   camera.cy = K[3];
-  read_distortion(entries, said, camera);
+  read_distortion(entries, said, camera, left_out);
   const std::array<int, 6> roi = roi_of(entries);
   take_rectified(entries, K, left_out);
   for (const std::string& name : entries.left_out()) left_out.push_back(name);

@@ -259,13 +259,14 @@ bool read_orb_slam(CameraFile& file) {
 // VINS's camera files (camodocal): the model's name, and maps of its parameters.
 bool read_vins(CameraFile& file) {
   const YAML::Node& root = file.root;
-  if (!root["model_type"] || (!root["projection_parameters"] && !root["mirror_parameters"]))
+  if (!root["model_type"] ||
+      (!root["projection_parameters"] && !root["mirror_parameters"] && !root["poly_parameters"]))
     return false;
-  const std::string word = word_at(root, "model_type", file.path);
-  const bool is_fisheye = word == "KANNALA_BRANDT";
-  if (!is_fisheye && word != "PINHOLE")
+  const std::string word = word_at(root, "model_type", file.path), plain = plain_name(word);
+  const bool is_fisheye = plain == "kannalabrandt";
+  if (!is_fisheye && plain != "pinhole" && plain != "pinholefull")
     throw BadInput(file.path + ": VINS's model_type '" + word.substr(0, 40) +
-                   "' is not one of PINHOLE, KANNALA_BRANDT: no lens here is that");
+                   "' is not one of PINHOLE, PINHOLE_FULL, KANNALA_BRANDT: no lens here is that");
   // KANNALA_BRANDT's k2 to k5 are of theta^3 to theta^9; mu, mv are fx, fy.
   static const std::map<std::string, std::string> names = {{"k2", "k1"}, {"k3", "k2"}, {"k4", "k3"},
                                                            {"k5", "k4"}, {"mu", "fx"}, {"mv", "fy"},
@@ -274,6 +275,7 @@ bool read_vins(CameraFile& file) {
   for (const auto& item : root) {
     const std::string entry = key_of(item.first);
     if (entry == "fisheye" || is_other_setting(entry)) continue;  // `fisheye` is of a mask
+    if (entry == "model_type" && !is_fisheye) continue;           // PINHOLE_FULL has k4, k5, k6
     if (!is_fisheye || entry != "projection_parameters" || !item.second.IsMap()) {
       entries.add(entry, item.second);
       continue;
@@ -301,8 +303,10 @@ bool read_nerfstudio(CameraFile& file) {
                          " of its own (one camera for each picture); " + kWriteOurs);
   if (!root["fl_x"]) return false;
   const std::string model = word_at(root, "camera_model", file.path);
-  if (model != "OPENCV_FISHEYE" && model != "FISHEYE" && root["k4"] && !root["k4"].IsNull() &&
-      number_at(root, "k4", file.path) != 0)
+  const std::string flag = plain_name(word_at(root, "is_fisheye", file.path));  // instant-ngp's
+  const bool is_fisheye =
+      model == "OPENCV_FISHEYE" || model == "FISHEYE" || flag == "true" || flag == "1";
+  if (!is_fisheye && root["k4"] && !root["k4"].IsNull() && number_at(root, "k4", file.path) != 0)
     throw BadInput(file.path + ": k4 is not 0, and no lens here has nerfstudio's k4");
   CameraEntries entries(YAML::Node(YAML::NodeType::Map), file.path);
   for (const auto& item : root)
@@ -390,6 +394,23 @@ void refuse_by_name(const YAML::Node& root, const std::string& path) {
   if (!other.empty()) throw BadInput(path + ": " + other + "; " + kWriteOurs);
 }
 
+// Refuses what is no text: archives of numpy, databases, pickles, COLMAP's .bin.
+void refuse_binary(const std::string& text, const std::string& path) {
+  const auto begins = [&](std::string_view head) { return text.rfind(head, 0) == 0; };
+  std::string what;
+  if (begins("PK\x03\x04"))
+    what = "a zip archive, as numpy's .npz";
+  else if (begins("SQLite format 3"))
+    what = "a database, as COLMAP's";
+  else if (begins("\xff\xfe") || begins("\xfe\xff"))
+    what = "text in UTF-16: save it as UTF-8";
+  else if (begins("\x1f\x8b"))
+    what = "compressed: unpack it";
+  else if (text.find('\0') != std::string::npos)
+    what = "a binary file, no text";
+  if (!what.empty()) throw BadInput(path + ": " + what + kKnown);
+}
+
 // Refuses the text files of other programs, with what to do.
 void refuse_text_by_name(const std::string& text, const std::string& path) {
   std::vector<std::string> first;
@@ -406,13 +427,13 @@ void refuse_text_by_name(const std::string& text, const std::string& path) {
                                             "EquiDistant", "ATAN",   "KannalaBrandt"};
   const bool is_dso = first.size() > 1 && dso.count(first[0]) != 0;
   const bool is_numbers =
-      first.size() >= 4 && std::all_of(first.begin(), first.end(), [](const std::string& word) {
+      first.size() >= 3 && std::all_of(first.begin(), first.end(), [](const std::string& word) {
         return word.find_first_not_of("-+0123456789.eE") == std::string::npos;
       });
   if (is_dso || is_numbers)
     throw BadInput(path +
-                   ": a camera of DSO, LSD-SLAM or PTAM (tum_ardrone), whose numbers may be "
-                   "relative to the picture's size; " +
+                   ": numbers without names: a matrix alone, or a camera of DSO, LSD-SLAM or PTAM "
+                   "(tum_ardrone), whose numbers may be relative to the picture's size; " +
                    kWriteOurs);
 }
 
@@ -438,6 +459,9 @@ void read_entries(CameraFile& file) {
   }
   if (read_orb_slam(file) || read_vins(file) || read_nerfstudio(file) || read_svo(file)) return;
   refuse_by_name(root, file.path);
+  if (root["cam0_calib"])
+    throw BadInput(file.path + ": VINS's settings, whose cameras are in files of their own: give " +
+                   word_at(root, "cam0_calib", file.path).substr(0, 80) + " (cam0_calib)");
   if (read_named(file)) return;
   try {
     CameraEntries(root, file.path).refuse_missing("camera_matrix");
@@ -490,6 +514,7 @@ CameraFile parse_camera_file(const std::string& given, const std::string& path) 
     file.is_colmap = true;
     return file;
   }
+  refuse_binary(text, path);
   refuse_text_by_name(text, path);
   file.root = root_of(text, path);
   read_entries(file);

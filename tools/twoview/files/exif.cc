@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <cstring>
 #include <memory>
 #include <string>
 
@@ -57,7 +58,19 @@ Data parsed(std::string_view bytes) {
   return Data(exif_data_new_from_data(reinterpret_cast<const unsigned char*>(bytes.data()), size));
 }
 
-// The first number of a tag; 0 where the tag is missing or of another type.
+// Bytes in the file's order as an IEEE number.
+template <class Number, class Bits>
+double ieee_of(const unsigned char* bytes, ExifByteOrder order) {
+  Bits bits = 0;
+  for (size_t i = 0; i < sizeof bits; ++i)
+    bits = bits << 8 | bytes[order == EXIF_BYTE_ORDER_MOTOROLA ? i : sizeof bits - 1 - i];
+  Number number = 0;
+  std::memcpy(&number, &bits, sizeof number);
+  return static_cast<double>(number);
+}
+
+// The first number of a tag; 0 where the tag is missing or a text. Programs write other types than
+// the standard's, as Pillow does (13.0: a float becomes a DOUBLE).
 double number_of(ExifData* data, ExifTag tag, ExifIfd directory = EXIF_IFD_EXIF) {
   ExifEntry* const entry = exif_content_get_entry(data->ifd[directory], tag);
   if (!entry || !entry->data || entry->components < 1) return 0;
@@ -71,6 +84,14 @@ double number_of(ExifData* data, ExifTag tag, ExifIfd directory = EXIF_IFD_EXIF)
       const ExifRational value = exif_get_rational(entry->data, order);
       return value.denominator ? static_cast<double>(value.numerator) / value.denominator : 0;
     }
+    case EXIF_FORMAT_SRATIONAL: {
+      const ExifSRational value = exif_get_srational(entry->data, order);
+      return value.denominator ? static_cast<double>(value.numerator) / value.denominator : 0;
+    }
+    case EXIF_FORMAT_SSHORT: return exif_get_sshort(entry->data, order);
+    case EXIF_FORMAT_SLONG: return exif_get_slong(entry->data, order);
+    case EXIF_FORMAT_FLOAT: return ieee_of<float, uint32_t>(entry->data, order);
+    case EXIF_FORMAT_DOUBLE: return ieee_of<double, uint64_t>(entry->data, order);
     default: return 0;
   }
 }
