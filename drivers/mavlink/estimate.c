@@ -129,6 +129,8 @@ void tvm_estimator_options_init(tvm_estimator_options *options) {
   options->struct_size = sizeof *options;
   options->messages = TVM_SEND_ODOMETRY;
   options->weak_factor = 3;
+  options->drift_share = 0.005;
+  options->drift_turn_rad = 0.008;
   memcpy(options->body_from_camera, ahead, sizeof ahead);
 }
 
@@ -139,6 +141,8 @@ tvs_status tvm_estimator_init(tvm_estimator *estimator, const tvm_estimator_opti
       options->weak > TVM_WEAK_GROWN || options->world < TVM_WORLD_FRD ||
       options->world > TVM_WORLD_NED ||
       !(options->weak_factor >= 1 && options->weak_factor <= 100) ||
+      !(options->drift_share >= 0 && options->drift_share <= 1) ||
+      !(options->drift_turn_rad >= 0 && options->drift_turn_rad <= 1) ||
       !is_rotation(options->body_from_camera) || !(length_sq(options->camera_in_body) < 1e6)) {
     return TVS_ERR_ARGUMENT;
   }
@@ -180,20 +184,14 @@ static int has_previous(const tvm_track *track) {
 
 /* Whether the map's adjustment has moved the last frame by more than its own standard deviation. */
 static int was_corrected(const tvm_estimator *e, const tvm_track *track) {
-  double moved[3], Rt[9], turn[9], w[3], position_sq = LEAST_JUMP_M * LEAST_JUMP_M,
-                                         angle_sq = LEAST_JUMP_RAD * LEAST_JUMP_RAD;
-  const double *C = e->last_covariance;
+  double moved[3], Rt[9], turn[9], w[3];
   int k;
   if (!has_previous(track) || !e->has_last) return 0;
   for (k = 0; k < 3; ++k) moved[k] = track->previous_t[k] - e->last_t[k];
   transpose(e->last_R, Rt);
   multiply(Rt, track->previous_R, turn);
   logarithm(turn, w);
-  if (e->has_last_covariance) {
-    angle_sq = C[0] + C[7] + C[14];
-    position_sq = C[21] + C[28] + C[35];
-  }
-  return length_sq(moved) > position_sq || length_sq(w) > angle_sq;
+  return length_sq(moved) > e->last_place_sq || length_sq(w) > e->last_turn_sq;
 }
 
 /* Counts what makes a pose jump. */
@@ -206,6 +204,7 @@ static void count_resets(tvm_estimator *e, const tvm_track *track) {
   if (jumps || was_corrected(e, track)) e->reset_counter = (e->reset_counter + 1) & 255;
   /* The way since the last frame is then not one of the vehicle. */
   if (jumps) e->has_last = 0;
+  if (s->segment != e->last_segment || is_metric != e->was_metric) e->path_m = 0;
   e->last_segment = s->segment;
   e->was_metric = is_metric;
 }
@@ -329,8 +328,24 @@ static void add_velocity(tvm_estimator *e, const tvm_track *track, const double 
   e->has_velocity = 1;
 }
 
+/* The way since the last frame, by the map as it is now. */
+static void add_way(tvm_estimator *e, const tvm_track *track) {
+  const double *from = has_previous(track) ? track->previous_t : e->last_t;
+  double step[3];
+  int k;
+  for (k = 0; k < 3; ++k) step[k] = track->state->world_from_cam_t[k] - from[k];
+  e->path_m += sqrt(length_sq(step));
+}
+
 static void keep_pose(tvm_estimator *e, const tvm_track *track) {
   const tv_odometry_state *s = track->state;
+  const tvm_estimator_options *o = &e->options;
+  const double *C = s->covariance, *t = s->world_from_cam_t;
+  e->last_place_sq = 3 * o->drift_share * o->drift_share * e->path_m * e->path_m +
+                     s->scale_sigma * s->scale_sigma * length_sq(t) +
+                     (s->has_covariance ? C[21] + C[28] + C[35] : LEAST_JUMP_M * LEAST_JUMP_M);
+  e->last_turn_sq = 3 * o->drift_turn_rad * o->drift_turn_rad +
+                    (s->has_covariance ? C[0] + C[7] + C[14] : LEAST_JUMP_RAD * LEAST_JUMP_RAD);
   memcpy(e->last_R, s->world_from_cam_R, sizeof e->last_R);
   memcpy(e->last_t, s->world_from_cam_t, sizeof e->last_t);
   memcpy(e->last_covariance, s->covariance, sizeof e->last_covariance);
@@ -353,8 +368,13 @@ static void estimate_of(tvm_estimator *e, const tvm_track *track, tvm_estimate *
     body_covariance(e, e->last_R, last_R, e->last_covariance, last);
   }
   add_velocity(e, track, R, p, now, last_R, last_p, last, out);
-  /* A metre that errs moves all places away from the map's origin together. */
+  /* A metre that errs moves all places away from the map's origin together; and the map drifts. */
   add_scale(s->scale_sigma, p, now);
+  for (k = 0; k < 3; ++k) {
+    const double place = e->options.drift_share * e->path_m, turn = e->options.drift_turn_rad;
+    now[7 * k] += place * place;
+    now[7 * (k + 3)] += turn * turn;
+  }
   if (e->options.world == TVM_WORLD_NED) {
     const double c = cos(track->heading_rad), n = sin(track->heading_rad);
     const double about_z[9] = {c, -n, 0, n, c, 0, 0, 0, 1};
@@ -396,6 +416,7 @@ tvs_status tvm_estimator_update(tvm_estimator *e, const tvm_track *track, tvm_es
   if (silence == TVM_SILENCE_NONE || silence == TVM_SILENCE_WEAK) {
     if (e->has_last && track->host_ns - e->last_ns > MOST_STEP_NS) e->has_last = 0;
     if (!e->has_last) e->has_velocity = 0;
+    if (e->has_last) add_way(e, track);
     if (!e->has_last && silence == TVM_SILENCE_NONE) silence = TVM_SILENCE_VELOCITY;
     if (silence == TVM_SILENCE_NONE) estimate_of(e, track, estimate);
     keep_pose(e, track);

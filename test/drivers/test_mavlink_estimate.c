@@ -20,6 +20,7 @@ static tvm_estimate estimate;
 
 void setUp(void) {
   tvm_estimator_options_init(&options);
+  options.drift_share = options.drift_turn_rad = 0; /* but in the test of these */
   memset(&state, 0, sizeof state);
   state.struct_size = sizeof state;
   state.status = TV_ODOMETRY_TRACKING;
@@ -246,6 +247,25 @@ static void test_a_metre_that_errs_grows_with_the_distance(void) {
   update();
   next(40);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.02 * 0.02 + 0.1 * 0.1, estimate.pose_covariance[0]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.02 * 0.02, estimate.pose_covariance[7]);
+}
+
+/* 4 m there and back: what drifts is by the way, not by the distance. A new segment begins anew. */
+static void test_the_map_drifts_with_the_way(void) {
+  options.drift_share = 0.005;
+  options.drift_turn_rad = 0.008;
+  begin();
+  set_covariance(0.001, 0.02);
+  update();
+  set_place(2, 0, 0);
+  next(400);
+  set_place(0, 0, 0);
+  next(400);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.02 * 0.02 + 0.02 * 0.02, estimate.pose_covariance[0]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.001 * 0.001 + 0.008 * 0.008, estimate.pose_covariance[35]);
+  state.segment = 1;
+  next(40);
+  next(40);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.02 * 0.02, estimate.pose_covariance[7]);
 }
 
@@ -797,6 +817,7 @@ int main(void) {
   RUN_TEST(test_the_covariance_is_that_of_place_roll_pitch_and_yaw);
   RUN_TEST(test_so_it_is_in_a_world_that_is_turned_to_north);
   RUN_TEST(test_a_metre_that_errs_grows_with_the_distance);
+  RUN_TEST(test_the_map_drifts_with_the_way);
   RUN_TEST(test_the_velocity_errs_by_both_places_and_by_what_changed);
   RUN_TEST(test_the_quality_falls_with_the_place_and_a_weak_frame_grows);
   RUN_TEST(test_what_is_not_known_is_not_sent);
