@@ -156,7 +156,7 @@ class DenseOptions:
 class DepthOptions:
     """The options of sweep_depth, as in tv_depth_options."""
 
-    max_pixels: int = 76800  #: most pixels of the map, [1024, 4194304]
+    max_pixels: int = 200000  #: most pixels of the map, [1024, 4194304]
     max_planes: int = 96  #: most planes of equal inverse depth, [16, 256]
     max_views: int = 5  #: most views, the reference included, [2, 7]
     near_depth: float = 0.0  #: the range along the optical axis that is searched, in the unit

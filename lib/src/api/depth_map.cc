@@ -16,7 +16,7 @@ namespace tv {
 namespace {
 
 constexpr int32_t kMaxSide = 16384;
-constexpr tv_depth_options kDefaults = {sizeof(tv_depth_options), 76800, 96, 5, 0.0, 0.0, 0.05};
+constexpr tv_depth_options kDefaults = {sizeof(tv_depth_options), 200000, 96, 5, 0.0, 0.0, 0.05};
 
 // The options without the range.
 tv_status read_options(const tv_depth_options* given, tv_depth_options* options) {
