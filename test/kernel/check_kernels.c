@@ -204,6 +204,34 @@ static void case_average_rows(trial *t) {
   REPEAT(t, t->set->average_rows(rows, weights, width, out));
 }
 
+static void case_squeeze_row(trial *t) {
+  const int32_t width = pick(t, 1, 300, 640), out_width = pick(t, 1, 400, 640);
+  const int32_t step = 65536 + random_int(&t->seed, 0, 3 * 65536);
+  const int32_t begin = random_int(&t->seed, -200 * 65536, 200 * 65536);
+  const uint8_t *row = row_of_bytes(t, width);
+  uint32_t *sums = OUTPUT(t, uint32_t, width);
+  uint16_t *out = OUTPUT(t, uint16_t, out_width);
+  REPEAT(t, t->set->squeeze_row(row, width, begin, step, out_width, sums, out));
+  memset(sums, 0, (size_t)width * sizeof *sums); /* unspecified, so not compared */
+}
+
+static void case_mix_rows(trial *t) {
+  const int32_t width = pick(t, 1, 300, 640);
+  const uint16_t *rows[TVK_MIX_ROWS];
+  int32_t weights[TVK_MIX_ROWS], rest = 256, k, x;
+  uint8_t *out;
+  for (k = 0; k < TVK_MIX_ROWS; ++k) {
+    uint16_t *row = INPUT(t, uint16_t, width);
+    const int32_t lowest = random_int(&t->seed, 0, 1) * 65000;
+    for (x = 0; x < width; ++x) row[x] = (uint16_t)random_int(&t->seed, lowest, 65280);
+    rows[k] = row;
+    weights[k] = k + 1 < TVK_MIX_ROWS ? random_int(&t->seed, 0, rest) : rest;
+    rest -= weights[k];
+  }
+  out = OUTPUT(t, uint8_t, width);
+  REPEAT(t, t->set->mix_rows(rows, weights, width, out));
+}
+
 static void case_halve_row(trial *t) {
   const int32_t out_width = pick(t, 1, 200, 320);
   const uint8_t *a = row_of_bytes(t, 2 * out_width), *b = row_of_bytes(t, 2 * out_width);

@@ -99,6 +99,7 @@ typedef struct tvk_nearest_shape {
 #define TVK_NEAREST_SCRATCH(num_rows, num_columns) \
   (TVK_NEAREST_CHUNK_BYTES(num_rows) + TVK_NEAREST_PANEL_BYTES(num_columns))
 
+#define TVK_MIX_ROWS 4           /* the rows that mix_rows adds up */
 #define TVK_WIDTH 8              /* numbers side by side in the arrays of the kernels on doubles */
 #define TVK_SCORE_BLOCK 32       /* matches in a block of sampson_score */
 #define TVK_SCORE_ONE 65536      /* the cost of a match outside the threshold */
@@ -153,6 +154,15 @@ typedef struct tvk_triangulate_pair {
 
    average_rows: out[x] = (the sum of three rows, weighted by row_weights, + 2^15) >> 16. The
    weights are at most 255 and add up to 256, the rows are at most 65280, and width is at least 16.
+
+   squeeze_row: out[u] = 256 times the mean of a row over the interval from begin + u step to begin +
+   (u + 1) step, in 1 / 65536 of a pixel from the left edge of the row, rounded. A pixel's value
+   holds over its whole width, the first and the last pixel's also beyond the row. step is in
+   [65536, 4 * 65536], begin and all ends of intervals are within 2^47. sums: scratch for `width`
+   numbers, which are unspecified afterwards.
+
+   mix_rows: out[x] = (the sum of TVK_MIX_ROWS rows, weighted by `weights`, + 2^15) >> 16. The
+   weights are in [0, 256] and add up to 256, and the rows are at most 65280.
 
    halve_row: out[x] = (a[2x] + a[2x+1] + b[2x] + b[2x+1] + 2) / 4.
 
@@ -259,6 +269,12 @@ typedef struct tvk_triangulate_pair {
     (const uint8_t *row, const tvk_columns *columns, int32_t out_width, uint16_t *sums))           \
   X(average_rows, void,                                                                            \
     (const uint16_t *const rows[3], const int32_t row_weights[3], int32_t width, uint8_t *out))    \
+  X(squeeze_row, void,                                                                             \
+    (const uint8_t *row, int32_t width, int64_t begin, int32_t step, int32_t out_width,            \
+     uint32_t *sums, uint16_t *out))                                                               \
+  X(mix_rows, void,                                                                                \
+    (const uint16_t *const rows[TVK_MIX_ROWS], const int32_t weights[TVK_MIX_ROWS], int32_t width, \
+     uint8_t *out))                                                                                \
   X(halve_row, void, (const uint8_t *a, const uint8_t *b, int32_t out_width, uint8_t *out))        \
   X(blur_row, void,                                                                                \
     (const uint8_t *above, const uint8_t *row, const uint8_t *below, int32_t width, uint8_t *out)) \

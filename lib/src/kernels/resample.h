@@ -69,6 +69,43 @@ static void average_rows(const uint16_t *const rows[3], const int32_t row_weight
   }
 }
 
+/* The integral of a row from its left edge to x, in 1 / 65536 of a grey level and modulo 2^32, since
+   only differences are used, which are below that. */
+static inline uint32_t integral_to(const uint8_t *row, const uint32_t *sums, int32_t last,
+                                   int64_t x) {
+  const int64_t pixel = x >> 16;
+  const int64_t at = pixel < 0 ? 0 : pixel > last ? last : pixel;
+  return (sums[at] << 16) + (uint32_t)(x - at * 65536) * row[at];
+}
+
+static void squeeze_row(const uint8_t *row, int32_t width, int64_t begin, int32_t step,
+                        int32_t out_width, uint32_t *sums, uint16_t *out) {
+  const uint64_t scale = (((uint64_t)1 << 40) + (uint64_t)step / 2) / (uint64_t)step;
+  uint32_t sum = 0, before;
+  int32_t x;
+  for (x = 0; x < width; ++x) {
+    sums[x] = sum;
+    sum += row[x];
+  }
+  before = integral_to(row, sums, width - 1, begin);
+  for (x = 0; x < out_width; ++x) {
+    const uint32_t after = integral_to(row, sums, width - 1, begin += step);
+    out[x] = (uint16_t)(((uint32_t)(after - before) * scale + ((uint64_t)1 << 31)) >> 32);
+    before = after;
+  }
+}
+
+static void mix_rows(const uint16_t *const rows[TVK_MIX_ROWS], const int32_t weights[TVK_MIX_ROWS],
+                     int32_t width, uint8_t *out) {
+  const uint16_t *const a = rows[0], *const b = rows[1], *const c = rows[2], *const d = rows[3];
+  const uint32_t wa = (uint32_t)weights[0], wb = (uint32_t)weights[1], wc = (uint32_t)weights[2],
+                 wd = (uint32_t)weights[3];
+  int32_t x;
+  for (x = 0; x < width; ++x) {
+    out[x] = (uint8_t)((a[x] * wa + b[x] * wb + c[x] * wc + d[x] * wd + 32768) >> 16);
+  }
+}
+
 static void halve_row(const uint8_t *a, const uint8_t *b, int32_t out_width, uint8_t *out) {
   int32_t x;
   for (x = 0; x < out_width; ++x) {
