@@ -23,8 +23,8 @@ from ._abi import (CORRESPONDENCE, DENSE_POINT, DESCRIPTOR_BYTES, DISTANCE_PRIOR
                    ROOM_PLANE, ROOM_VERTEX,
                    TV_ERR_ALIGNMENT,
                    TV_ERR_ARGUMENT,
-                   TV_ERR_CAMERA, TV_ERR_CAPACITY, TV_ERR_KERNELS, TV_ERR_LIMITS, TV_ERR_MAP,
-                   TV_ERR_MASK, TV_ERR_MEMORY,
+                   TV_ERR_CAMERA, TV_ERR_CAPACITY, TV_ERR_EFFORT, TV_ERR_KERNELS,
+                   TV_ERR_LIMITS, TV_ERR_MAP, TV_ERR_MASK, TV_ERR_MEMORY,
                    TV_ERR_NOT_FINITE, TV_ERR_NULL, TV_ERR_OUTSIDE, TV_ERR_OVERLAP,
                    TV_ERR_STRIDE, TV_ERR_STRUCT_SIZE, TV_ERR_TIME, WINDOW_VIEW, Library,
                    StatusError, default_library)
@@ -48,8 +48,8 @@ from .options import (AbsolutePoseOptions, BundleOptions, DenseOptions, DepthOpt
 from .room import ROOM_DEFAULT_BYTES, Room, RoomMesh, RoomState
 from .stages import (BundleResult, Reconstruction, TwoView, adjust_two_view, align_matches,
                      correct_matches, corrected_camera, describe, detect, estimate_two_view,
-                     extract, keypoint_sigmas, match, match_guided, orient, point_covariances,
-                     reconstruct, triangulate)
+                     extract, keypoint_shapes, keypoint_sigmas, match, match_guided, orient,
+                     point_covariances, reconstruct, triangulate)
 from .window import WindowResult, adjust_window
 
 #: The version of the loaded library, such as "0.1.0": that of version_string().
@@ -82,7 +82,8 @@ __all__ = [
     "ROOM_PLANE", "ROOM_VERTEX", "Reason", "Reconstruction", "Room", "RoomInferOptions",
     "RoomMesh", "RoomMeshOptions", "RoomOptions", "RoomPlaneKind", "RoomPlaneOptions",
     "RoomState", "ScaleSource", "Solver", "Stage", "Status", "StatusError", "TV_ERR_ALIGNMENT",
-    "TV_ERR_ARGUMENT", "TV_ERR_CAMERA", "TV_ERR_CAPACITY", "TV_ERR_KERNELS", "TV_ERR_LIMITS",
+    "TV_ERR_ARGUMENT", "TV_ERR_CAMERA", "TV_ERR_CAPACITY", "TV_ERR_EFFORT", "TV_ERR_KERNELS",
+    "TV_ERR_LIMITS",
     "TV_ERR_MAP", "TV_ERR_MASK", "TV_ERR_MEMORY", "TV_ERR_NOT_FINITE", "TV_ERR_NULL",
     "TV_ERR_OUTSIDE", "TV_ERR_OVERLAP", "TV_ERR_STRIDE", "TV_ERR_STRUCT_SIZE", "TV_ERR_TIME",
     "Triangulation",
@@ -92,7 +93,7 @@ __all__ = [
     "camera_undistort", "camera_unproject_points", "camera_valid_angle", "correct_matches",
     "corrected_camera", "default_library", "densify", "describe", "detect",
     "estimate_absolute_pose", "estimate_two_view", "extract", "format_cameras",
-    "keypoint_sigmas", "match", "match_guided", "orient", "parse_cameras",
+    "keypoint_shapes", "keypoint_sigmas", "match", "match_guided", "orient", "parse_cameras",
     "point_covariances",
     "read_camera", "read_cameras", "read_sigmas", "reconstruct", "sweep_depth", "triangulate",
     "version_string", "write_cameras"]

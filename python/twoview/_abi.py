@@ -26,7 +26,7 @@ CONTEXT_ALIGNMENT = 64
 class tv_limits(Structure):
     _fields_ = [("struct_size", c_uint32), ("max_width", c_int32), ("max_height", c_int32),
                 ("max_keypoints", c_int32), ("max_matches", c_int32), ("kernels", c_int32),
-                ("purposes", c_uint32)]
+                ("purposes", c_uint32), ("max_effort", c_int32)]
 
 
 class tv_image(Structure):
@@ -86,7 +86,8 @@ class tv_estimate_options(Structure):
                 ("principal_point_sigma", c_double),
                 ("focal_sigma0", c_double), ("focal_sigma1", c_double),
                 ("center_sigma0", c_double), ("center_sigma1", c_double),
-                ("readout_turn_sigma_rad", c_double)]
+                ("readout_turn_sigma_rad", c_double), ("num_trials", c_int32),
+                ("reserved", c_int32)]
 
 
 class tv_two_view(Structure):
@@ -127,7 +128,8 @@ class tv_reconstruct_options(Structure):
     _fields_ = [("struct_size", c_uint32), ("triangulation", c_int32), ("feature", c_void_p),
                 ("match", c_void_p), ("estimate", c_void_p), ("guided_matching", c_int32),
                 ("bundle_adjustment", c_int32), ("sigma_by_size", c_double),
-                ("align_matches", c_int32), ("reserved", c_int32)]
+                ("align_matches", c_int32), ("reserved", c_int32), ("effort", c_int32),
+                ("max_effort", c_int32)]
 
 
 class tv_reconstruction(Structure):
@@ -135,7 +137,8 @@ class tv_reconstruction(Structure):
                 ("num_matches_left_out", c_int32),
                 ("keypoints", c_void_p * 2), ("descriptors", c_void_p * 2),
                 ("num_matches", c_int32), ("num_points", c_int32), ("matches", c_void_p),
-                ("inlier_mask", c_void_p), ("points", c_void_p)]
+                ("inlier_mask", c_void_p), ("points", c_void_p), ("effort", c_int32),
+                ("num_rungs", c_int32), ("tilts", c_void_p * 2), ("rung_ns", c_uint64 * 4)]
 
 
 class tv_bundle_options(Structure):
@@ -448,6 +451,10 @@ class TV_ERR_STRIDE(StatusError, ValueError):
 
 class TV_ERR_MASK(StatusError, ValueError):
     status = Status.ERR_MASK
+
+
+class TV_ERR_EFFORT(StatusError, ValueError):
+    status = Status.ERR_EFFORT
 
 
 ERRORS = {int(kind.status): kind for kind in StatusError.__subclasses__()}

@@ -16,21 +16,23 @@ class Context:
     """tv_context in memory that Python owns.
 
     max_width, max_height: the largest image, pixels. max_keypoints: the most descriptors of an
-    image. max_matches: the most matches of an estimate; 0 means max_keypoints. kernels: a
-    Kernels. purposes: bits of Purpose for the calls that get memory, 0 for all; another call
-    raises TV_ERR_LIMITS. library: a Library in place of the package's own. Calls from several
-    threads wait for each other; use one context for each thread to run them at once. close() or
-    a with statement frees the memory; later calls raise ValueError.
+    image. max_matches: the most matches of an estimate; 0 means max_keypoints. kernels: a Kernels.
+    max_effort: the highest rung of effort of reconstruct, 0 to 3. purposes: bits of Purpose for the
+    calls that get memory, 0 for all; another call raises TV_ERR_LIMITS. library: a Library in place
+    of the package's own. Calls from several threads wait for each other; use one context for each
+    thread to run them at once. close() or a with statement frees the memory; later calls raise
+    ValueError.
     Raises TV_ERR_ARGUMENT for a limit out of its range, TV_ERR_KERNELS for kernels that this CPU
     does not have, ImportError where there is no library."""
 
     def __init__(self, *, max_width: int = 640, max_height: int = 480, max_keypoints: int = 2048,
                  max_matches: int = 0, kernels: int = Kernels.AUTO,
-                 purposes: int = 0, library: Optional[_abi.Library] = None):
+                 purposes: int = 0, library: Optional[_abi.Library] = None, max_effort: int = 0):
         self.library = library or _abi.default_library()
         limits = self.library.make(_abi.tv_limits, {
             "max_width": max_width, "max_height": max_height, "max_keypoints": max_keypoints,
-            "max_matches": max_matches, "kernels": kernels, "purposes": purposes})
+            "max_matches": max_matches, "kernels": kernels, "purposes": purposes,
+            "max_effort": max_effort})
         size = ctypes.c_size_t()
         self.library.call("tv_context_size", ctypes.byref(limits), ctypes.byref(size))
         self._memory: Optional[np.ndarray] = np.empty(size.value + _abi.CONTEXT_ALIGNMENT, np.uint8)

@@ -23,6 +23,7 @@ class Status(IntEnum):
     ERR_TIME = 14
     ERR_STRIDE = 15
     ERR_MASK = 16
+    ERR_EFFORT = 17
 
 
 class Kernels(IntEnum):

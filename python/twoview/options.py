@@ -87,6 +87,8 @@ class EstimateOptions(_Options):
     #: Standard deviation of a camera's turn while a picture's rows are read, about each axis,
     #: radians; 0: all rows are exposed at once, and no rolling shutter is tested.
     readout_turn_sigma_rad: float = 0.02
+    num_trials: int = 0  #: which attempt at the pair this is; 0 means the first
+    reserved: int = 0  #: must be 0
 
 
 @dataclass(frozen=True)

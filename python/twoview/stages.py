@@ -155,6 +155,25 @@ def _pairs(context: Context, pixels0: np.ndarray, pixels1: np.ndarray,
     return pairs
 
 
+def keypoint_shapes(keypoints: np.ndarray, tilts: Optional[ArrayLike] = None) -> np.ndarray:
+    """tv_keypoint_shapes: how the patches of keypoints lie in the image.
+
+    keypoints: (n,) of twoview.KEYPOINT. tilts: None, or (n,) uint8 of a Reconstruction.
+    Returns (n, 2, 2) float64, whose columns are the patch's x and y axis in pixels, as long as the
+    keypoint's size is in its view.
+    Raises TypeError for another dtype, ValueError for counts that differ, TV_ERR_ARGUMENT or
+    TV_ERR_NOT_FINITE for a number out of its range."""
+    keypoints = _abi.check_array("keypoints", keypoints, _abi.KEYPOINT)
+    of_views = None if tilts is None else _abi.check_array("tilts", tilts, np.uint8)
+    if of_views is not None and len(of_views) != len(keypoints):
+        raise ValueError(f"{len(of_views)} tilts and {len(keypoints)} keypoints")
+    shapes = np.empty((len(keypoints), 2, 2))
+    _abi.default_library().call(
+        "tv_keypoint_shapes", _abi.pointer(keypoints), _abi.pointer(of_views),
+        c_int32(len(keypoints)), _abi.pointer(shapes))
+    return shapes
+
+
 def match(context: Context, descriptors0: ArrayLike, descriptors1: ArrayLike,
           options: Optional[MatchOptions] = None, keypoints0: Optional[np.ndarray] = None,
           keypoints1: Optional[np.ndarray] = None, **keywords: Any) -> np.ndarray:
@@ -570,6 +589,10 @@ class Reconstruction(Record):
     num_points: int  #: how many of the points have the status OK
     #: Matches that exceed the context's max_matches; those with the highest ratios are left out.
     num_matches_left_out: int
+    effort: int = 0  #: the rung of effort whose result this is
+    num_rungs: int = 1  #: how many rungs were run; that of `effort` is the last
+    #: (n0,) and (n1,) uint8: the tilt of each keypoint's view, for keypoint_shapes; 0: not squeezed
+    tilts: tuple[np.ndarray, ...] = ()
 
     def __str__(self) -> str:
         return (f"{self.num_points} points of {int(self.inlier_mask.sum())} inliers among "
@@ -591,8 +614,8 @@ def reconstruct(context: Context, image0: np.ndarray, camera0: Optional[Camera],
                 match: Optional[MatchOptions] = None, estimate: Optional[EstimateOptions] = None,
                 triangulation: int = Triangulation.ITERATIVE_LS, guided_matching: bool = False,
                 bundle_adjustment: bool = False,
-                sigma_by_size: float = 1.0,
-                align_matches: bool = True) -> tuple[TwoView, Reconstruction]:
+                sigma_by_size: float = 1.0, align_matches: bool = True, effort: int = 0,
+                max_effort: int = 0) -> tuple[TwoView, Reconstruction]:
     """tv_reconstruct: from two images to a pose and points.
 
     context: as large as both images. image0, image1: (height, width) uint8, read without a copy.
@@ -602,7 +625,9 @@ def reconstruct(context: Context, image0: np.ndarray, camera0: Optional[Camera],
     None for the defaults. triangulation: a Triangulation. guided_matching: whether a second
     matching follows along the epipolar lines. bundle_adjustment: whether pose and points are
     adjusted together. sigma_by_size: the exponent of keypoint_sigmas, [0, 2]. align_matches:
-    whether one keypoint of each match is moved by the pixels around both.
+    whether one keypoint of each match is moved by the pixels around both. effort: the rung of
+    effort to begin with, 0 to the context's max_effort; max_effort: the highest rung, which is
+    climbed to while the verdict is not OK and the evidence says that more could help.
     Returns a TwoView and a Reconstruction. "No geometry" is a result, not an exception: see
     TwoView.verdict.
     Raises TypeError or ValueError for an array that C could not read and for one camera alone,
@@ -612,7 +637,7 @@ def reconstruct(context: Context, image0: np.ndarray, camera0: Optional[Camera],
         context, image0, camera0, image1, camera1, (mask0, mask1), (feature, match, estimate),
         triangulation=triangulation, guided_matching=guided_matching,
         bundle_adjustment=bundle_adjustment, sigma_by_size=sigma_by_size,
-        align_matches=align_matches)
+        align_matches=align_matches, effort=effort, max_effort=max_effort)
     return _two_view(found), cloud
 
 
@@ -660,5 +685,9 @@ def _reconstruct(context: Context, image0: np.ndarray, camera0: Optional[Camera]
                                 _copied(cloud.matches, m, _abi.CORRESPONDENCE),
                                 _copied(cloud.inlier_mask, m, np.uint8).view(bool),
                                 _copied(cloud.points, m, _abi.POINT), cloud.num_points,
-                                cloud.num_matches_left_out)
+                                cloud.num_matches_left_out, cloud.effort,
+                                cloud.num_rungs,
+                                tuple(_copied(cloud.tilts[v], n[v], np.uint8)
+                                      if cloud.tilts[v] else np.zeros(n[v], np.uint8)
+                                      for v in range(2)))
     return found, result

@@ -23,14 +23,14 @@
    these are all structs without pointers. */
 #define LAYOUT(type, bytes, last, offset) \
   _Static_assert(sizeof(type) == bytes && offsetof(type, last) == offset, #type)
-LAYOUT(tv_limits, 28, purposes, 24);
+LAYOUT(tv_limits, 32, max_effort, 28);
 LAYOUT(tv_keypoint, 24, level, 20);
 LAYOUT(tv_feature_options, 56, reserved, 52);
 LAYOUT(tv_correspondence, 16, ratio, 12);
 LAYOUT(tv_match_options, 16, max_distance, 12);
 LAYOUT(tv_guided_options, 20, neighbourhood_px, 16);
 LAYOUT(tv_camera, 112, k, 48);
-LAYOUT(tv_estimate_options, 144, readout_turn_sigma_rad, 136);
+LAYOUT(tv_estimate_options, 152, reserved, 148);
 LAYOUT(tv_two_view, 1040, camera_direction_rad, 1032);
 LAYOUT(tv_point, 40, reserved, 36);
 LAYOUT(tv_bundle_options, 24, hold_pose, 20);

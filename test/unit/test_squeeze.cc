@@ -59,7 +59,8 @@ long double row_mean(const tv_image& image, int y, long double begin, long doubl
   long double sum = 0;
   for (int x = static_cast<int>(std::floor(begin)); x < end; ++x) {
     const int at = x < 0 ? 0 : x < image.width ? x : image.width - 1;
-    const long double share = std::fmin(end, x + 1.0L) - std::fmax(begin, static_cast<long double>(x));
+    const long double share =
+        std::fmin(end, x + 1.0L) - std::fmax(begin, static_cast<long double>(x));
     sum += share * image.data[y * image.stride_bytes + at];
   }
   return sum / (end - begin);
@@ -143,7 +144,8 @@ void test_every_point_of_the_image_is_in_the_squeezed_one() {
 
 void test_a_ramp_has_the_value_of_the_point_that_a_pixel_comes_from() {
   for (int y = 0; y < kMaxSide; ++y) {
-    for (int x = 0; x < kMaxSide; ++x) pixels[y * kMaxSide + x] = static_cast<uint8_t>(x / 2 + y / 2);
+    for (int x = 0; x < kMaxSide; ++x)
+      pixels[y * kMaxSide + x] = static_cast<uint8_t>(x / 2 + y / 2);
   }
   for (const Shape& shape : kShapes) {
     const tv::Squeeze s = squeeze_of(shape, kMaxSide, kMaxSide);
@@ -213,7 +215,8 @@ void test_the_mask_leaves_out_what_is_beyond_the_image_or_masked_there() {
           tv::to_image(s, u, v, &x, &y);
           x += 0.5;  // from the edges
           y += 0.5;
-          const double nearest = std::fmin(std::fabs(x - std::round(x)), std::fabs(y - std::round(y)));
+          const double nearest =
+              std::fmin(std::fabs(x - std::round(x)), std::fabs(y - std::round(y)));
           // On an edge between pixels rounding may choose either one, unless all is whole.
           if (nearest > 0 && nearest < 1e-3) continue;
           const bool inside = x >= tv::kSqueezeMargin && x < kWidth - tv::kSqueezeMargin;

@@ -181,6 +181,18 @@ TV_API tv_status tv_extract(tv_context *context, const tv_image *image, const tv
 TV_API tv_status tv_keypoint_sigmas(const tv_keypoint *keypoints, int32_t num_keypoints,
                                     float size_of_one, double exponent, float *sigmas);
 
+/* Computes how the patches of keypoints lie in the image: shapes[4 k] to shapes[4 k + 3] are a 2 x
+   2 matrix, row-major, whose columns are the x and the y axis of patch k in pixels, each as long as
+   the keypoint's size is in the view that it was found in. A keypoint of the image as it is has
+   size times the rotation by angle_rad; one of a squeezed view has an ellipse of the same area as a
+   circle of its size: its patch is longer along the direction of the view. keypoints:
+   num_keypoints; every field is checked as tv_describe checks it. tilts: null (all 0), or
+   num_keypoints bytes (tv_reconstruction.tilts). shapes: room for 4 x num_keypoints.
+   Returns TV_ERR_NULL, TV_ERR_ARGUMENT (also a tilt above 16), TV_ERR_NOT_FINITE, TV_ERR_OVERLAP.
+   Thread-safe. */
+TV_API tv_status tv_keypoint_shapes(const tv_keypoint *keypoints, const uint8_t *tilts,
+                                    int32_t num_keypoints, double *shapes);
+
 TV_END_DECLS
 
 #endif

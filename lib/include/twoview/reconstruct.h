@@ -74,6 +74,18 @@ typedef struct tv_reconstruct_options {
   int32_t align_matches;
   /* Must be 0. */
   int32_t reserved;
+  /* The rung of effort to begin with, [0, the context's max_effort]; 0 (default): one view of each
+     image and max_keypoints keypoints in it, N for short. 1: 4 N keypoints, where the image has
+     them. 2: N keypoints, and N / 2 in each of four views that are squeezed by 2, as a plane seen
+     at 60 degrees is, along 0, 45, 90 and 135 degrees. 3: 16 squeezed views, by sqrt(2), 2 and 2
+     sqrt(2), 6.4 N keypoints in all. A higher rung finds matches where a turned wall or a wide
+     baseline leaves too few; docs/algorithms/effort.md has what each gains and takes. */
+  int32_t effort;
+  /* The highest rung that may be climbed to, [0, the context's max_effort]; 0 (default), and any
+     value that is not above `effort`: none but `effort` is run. While the verdict is not "ok" and
+     the evidence says that more could help, the next rung is run; its result replaces that of the
+     one before. Blank or equal pictures and, mostly, unrelated ones end it early. */
+  int32_t max_effort;
 } tv_reconstruct_options;
 
 /* Writes the default options into a struct of struct_size bytes; null is allowed. Programs call
@@ -112,6 +124,15 @@ typedef struct tv_reconstruction {
   /* num_matches points; the status is TV_POINT_INVALID where the match is no inlier, and everywhere
      if there is no full pose. */
   const tv_point *points;
+  /* The rung of effort whose result this is, and how many rungs were run. */
+  int32_t effort;
+  int32_t num_rungs;
+  /* The tilt of each keypoint of view 0 and of view 1, for tv_keypoint_shapes: 0 for the image as
+     it is, 1 to 16 for the squeezed views of rungs 2 and 3. */
+  const uint8_t *tilts[2];
+  /* The nanoseconds that each of the rungs that were run took, the first one first; 0 without a
+     clock. */
+  uint64_t rung_ns[4];
 } tv_reconstruction;
 
 /* Writes zeros into a struct of struct_size bytes, and the size; null is allowed. Programs call

@@ -83,7 +83,10 @@ typedef enum tv_status {
   TV_ERR_STRIDE = 15,
   /* The mask of a frame is not of its image's size, or its stride does not fit its width
      (tv_odometry_track, tv_odometry_locate_masked). */
-  TV_ERR_MASK = 16
+  TV_ERR_MASK = 16,
+  /* effort or max_effort of the options is above max_effort of the limits that the context was made
+     with (tv_reconstruct). */
+  TV_ERR_EFFORT = 17
 } tv_status;
 
 /* Returns a short English phrase for a status, or "unknown status" for any other number. The string

@@ -194,6 +194,13 @@ typedef struct tv_estimate_options {
      rows are those of the image as given: of a picture that was turned since, or of a sensor that
      exposes all rows at once (global shutter), 0 may be stated, which leaves the test out. */
   double readout_turn_sigma_rad;
+  /* Which attempt at these two images this is, [0, 10000]; 0 (default) means the first. Whoever
+     tries again until the verdict is "ok" gives accident as many chances as there are attempts: the
+     test against chance therefore counts so many times as many models, and the odds that the pose
+     is wrong are so many times as high. tv_reconstruct adds the rungs of effort that it climbed. */
+  int32_t num_trials;
+  /* Must be 0. */
+  int32_t reserved;
 } tv_estimate_options;
 
 /* Writes the default options into a struct of struct_size bytes; null is allowed. Programs call

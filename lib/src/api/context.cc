@@ -6,6 +6,7 @@
 #include "api/scratch.h"
 #include "api/sized.h"
 #include "api/within.h"
+#include "feature/tilts.h"
 
 namespace tv {
 namespace {
@@ -15,7 +16,7 @@ constexpr int32_t kMaxKeypoints = 65535;
 constexpr int32_t kMaxMatches = 1000000;
 constexpr uint32_t kAllPurposes = 2 * TV_PURPOSE_ABSOLUTE_POSE - 1;
 
-constexpr tv_limits kDefaults = {sizeof(tv_limits), 640, 480, 2048, 0, TV_KERNELS_AUTO, 0};
+constexpr tv_limits kDefaults = {sizeof(tv_limits), 640, 480, 2048, 0, TV_KERNELS_AUTO, 0, 0};
 
 // Reads the limits, and resolves max_matches 0 and purposes 0.
 tv_status read_limits(const tv_limits* given, tv_limits* limits) {
@@ -27,13 +28,15 @@ tv_status read_limits(const tv_limits* given, tv_limits* limits) {
       !within(limits->max_keypoints, 1, kMaxKeypoints) ||
       !within(limits->max_matches, 0, kMaxMatches) ||
       !within(limits->kernels, TV_KERNELS_AUTO, TV_KERNELS_NEON) ||
-      limits->purposes > kAllPurposes) {
+      limits->purposes > kAllPurposes || !within(limits->max_effort, 0, kMaxEffort)) {
     return TV_ERR_ARGUMENT;
   }
   if (limits->max_matches == 0) limits->max_matches = limits->max_keypoints;
   if (limits->purposes == 0) limits->purposes = kAllPurposes;
   if ((limits->purposes & TV_PURPOSE_RECONSTRUCT & ~7u) != 0) {  // tv_reconstruct's own bit
     limits->purposes |= TV_PURPOSE_RECONSTRUCT;
+  } else {
+    limits->max_effort = 0;
   }
   return TV_OK;
 }
@@ -69,6 +72,7 @@ tv_status tv_context_init(tv_context** context, const tv_limits* limits, void* m
   *made = tv_context{};
   made->limits = read;
   made->kernels = kernels;
+  made->most_keypoints = tv::most_keypoints(read);
   made->arena =
       tv::arena_over(static_cast<uint8_t*>(memory) + tv::kContextBytes, needed - tv::kContextBytes);
   *context = made;

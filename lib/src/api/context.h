@@ -7,9 +7,10 @@
 #include "twoview/context.h"
 
 struct tv_context {
-  tv_limits limits;  // max_matches and purposes are resolved, never 0
+  tv_limits limits;  // max_matches and purposes are resolved, never 0; max_effort, too
   const tvk_table* kernels;
   tv::Arena arena;  // scratch of the running call; after tv_reconstruct its front holds the results
+  int32_t most_keypoints;  // of an image: those of the highest rung of effort
   tv_clock clock;
   void* clock_user;
   uint64_t stage_ns[TV_NUM_STAGES];
@@ -28,17 +29,21 @@ inline bool made_for(const tv_context& context, uint32_t purposes) {
   return (context.limits.purposes & purposes) == purposes;
 }
 
+// The caller's clock, or 0 where there is none.
+inline uint64_t clock_ns(const tv_context& context) {
+  return context.clock != nullptr ? context.clock(context.clock_user) : 0;
+}
+
 // Adds the time from its construction to its destruction to the time of a stage.
 class StageTimer {
  public:
   StageTimer(tv_context* context, tv_stage stage)
-      : context_(context), stage_(stage), start_ns_(now()) {}
-  ~StageTimer() { context_->stage_ns[stage_] += now() - start_ns_; }
+      : context_(context), stage_(stage), start_ns_(clock_ns(*context)) {}
+  ~StageTimer() { context_->stage_ns[stage_] += clock_ns(*context_) - start_ns_; }
   StageTimer(const StageTimer&) = delete;
   StageTimer& operator=(const StageTimer&) = delete;
 
  private:
-  uint64_t now() const { return context_->clock ? context_->clock(context_->clock_user) : 0; }
   tv_context* context_;
   tv_stage stage_;
   uint64_t start_ns_;

@@ -4,10 +4,12 @@
 
 #include <algorithm>
 
+#include "api/extract.h"
 #include "api/sized.h"
 #include "api/validate.h"
 #include "feature/corners.h"
 #include "feature/describe.h"
+#include "feature/tilts.h"
 
 namespace tv {
 namespace {
@@ -57,13 +59,14 @@ Octaves octaves_for(tv_context* context, const tv_image& image, int32_t pooling,
 }
 
 // Writes as many oriented keypoints as fit; returns how many there are in all. At most max_seconds
-// second orientations are kept: those that come first in the order of the keypoints.
+// second orientations are kept: those that come first in the order of the keypoints. upright_rad:
+// the angle of upright ones.
 int32_t orient_keypoints(const tv_context& context, const Octaves& octaves, int32_t orientation,
-                         const tv_keypoint* keypoints, int32_t count, int32_t max_seconds,
-                         tv_keypoint* oriented, int32_t capacity) {
+                         float upright_rad, const tv_keypoint* keypoints, int32_t count,
+                         int32_t max_seconds, tv_keypoint* oriented, int32_t capacity) {
   int32_t total = 0, seconds = 0;
   for (int32_t k = 0; k < count; ++k) {
-    float angles_rad[2] = {0.0f, 0.0f};
+    float angles_rad[2] = {upright_rad, 0.0f};
     int32_t peaks = 1;
     if (orientation == TV_ORIENTATION_GRADIENT) {
       peaks = dominant_angles(*context.kernels, octaves, keypoints[k], angles_rad);
@@ -94,6 +97,27 @@ __attribute__((noinline)) bool overlaps_any(Bytes out, Bytes other, const tv_ima
 }
 
 }  // namespace
+
+int32_t extract_keypoints(tv_context* context, const tv_image& image, const tv_image* mask,
+                          const tv_feature_options& options, float upright_rad,
+                          tv_keypoint* keypoints, uint8_t* descriptors, int32_t capacity) {
+  ArenaScope scope(context->arena);
+  int32_t num_corners = 0;
+  const tv_keypoint* corners = detect_into_arena(context, image, mask, options, &num_corners);
+  const Octaves octaves = octaves_for(context, image, options.pooling, corners, num_corners);
+  StageTimer timer(context, TV_STAGE_DESCRIBE);
+  tv_keypoint* oriented =
+      arena_alloc<tv_keypoint>(context->arena, static_cast<size_t>(options.max_keypoints));
+  const int32_t count =
+      orient_keypoints(*context, octaves, options.orientation, upright_rad, corners, num_corners,
+                       options.max_keypoints - num_corners, oriented, options.max_keypoints);
+  if (count > capacity) return count;
+  std::copy(oriented, oriented + count, keypoints);
+  describe_keypoints(*context->kernels, octaves, keypoints, count, options.descriptor,
+                     options.pooling, descriptors);
+  return count;
+}
+
 }  // namespace tv
 
 void tv_features_init_sized(tv_features* features, size_t struct_size) {
@@ -144,12 +168,12 @@ tv_status tv_orient(tv_context* context, const tv_image* image, const tv_feature
   const tv::Octaves octaves = tv::octaves_for(context, *image, 0, keypoints, num_keypoints);
   tv::StageTimer timer(context, TV_STAGE_DESCRIBE);
   const int32_t orientation = request.options.orientation;
-  const int32_t total = tv::orient_keypoints(*context, octaves, orientation, keypoints,
+  const int32_t total = tv::orient_keypoints(*context, octaves, orientation, 0.0f, keypoints,
                                              num_keypoints, num_keypoints, nullptr, 0);
   *num_oriented = total;
   if (total > cap_oriented) return TV_ERR_CAPACITY;
-  tv::orient_keypoints(*context, octaves, orientation, keypoints, num_keypoints, num_keypoints,
-                       oriented, cap_oriented);
+  tv::orient_keypoints(*context, octaves, orientation, 0.0f, keypoints, num_keypoints,
+                       num_keypoints, oriented, cap_oriented);
   return TV_OK;
 }
 
@@ -190,22 +214,28 @@ tv_status tv_extract(tv_context* context, const tv_image* image, const tv_image*
   if (tv::overlaps_any(keypoints_out, out, image, mask) || tv::overlaps_any(out, {}, image, mask)) {
     return TV_ERR_OVERLAP;
   }
-  tv::ArenaScope scope(context->arena);
-  const tv_feature_options& o = request.options;
-  int32_t num_corners = 0;
-  const tv_keypoint* corners = tv::detect_into_arena(context, *image, mask, o, &num_corners);
-  const tv::Octaves octaves = tv::octaves_for(context, *image, o.pooling, corners, num_corners);
-  tv::StageTimer timer(context, TV_STAGE_DESCRIBE);
-  tv_keypoint* oriented =
-      tv::arena_alloc<tv_keypoint>(context->arena, static_cast<size_t>(o.max_keypoints));
-  const int32_t count =
-      tv::orient_keypoints(*context, octaves, o.orientation, corners, num_corners,
-                           o.max_keypoints - num_corners, oriented, o.max_keypoints);
-  *num_keypoints = count;
-  if (count > cap_keypoints) return TV_ERR_CAPACITY;
-  std::copy(oriented, oriented + count, keypoints);
-  tv::describe_keypoints(*context->kernels, octaves, keypoints, count, o.descriptor, o.pooling,
-                         descriptors);
+  *num_keypoints = tv::extract_keypoints(context, *image, mask, request.options, 0.0f, keypoints,
+                                         descriptors, cap_keypoints);
+  return *num_keypoints > cap_keypoints ? TV_ERR_CAPACITY : TV_OK;
+}
+
+tv_status tv_keypoint_shapes(const tv_keypoint* keypoints, const uint8_t* tilts,
+                             int32_t num_keypoints, double* shapes) {
+  if (num_keypoints > 0 && (keypoints == nullptr || shapes == nullptr)) return TV_ERR_NULL;
+  if (num_keypoints < 0) return TV_ERR_ARGUMENT;
+  const tv_status status = tv::check_keypoints(keypoints, num_keypoints);
+  if (status != TV_OK) return status;
+  const size_t n = static_cast<size_t>(num_keypoints);
+  const tv::Bytes arrays[] = {{shapes, 4 * n * sizeof(double)},
+                              {keypoints, n * sizeof(tv_keypoint)},
+                              {tilts, tilts == nullptr ? 0 : n}};
+  if (tv::outputs_overlap(arrays, 1, 3)) return TV_ERR_OVERLAP;
+  for (size_t k = 0; tilts != nullptr && k < n; ++k) {
+    if (tilts[k] >= tv::kNumTilts) return TV_ERR_ARGUMENT;
+  }
+  for (size_t k = 0; k < n; ++k) {
+    tv::patch_shape(keypoints[k], tilts == nullptr ? 0 : tilts[k], shapes + 4 * k);
+  }
   return TV_OK;
 }
 

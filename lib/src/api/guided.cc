@@ -55,8 +55,9 @@ GuidedView make_view(const tv_camera* camera, const tv_features& features, Arena
 }  // namespace
 
 size_t guided_scratch_bytes(const tv_limits& limits) {
-  return 2 * rays_bytes(limits.max_keypoints) + guided_bytes(limits.max_keypoints) +
-         arena_bytes<tv_correspondence>(static_cast<size_t>(limits.max_keypoints));
+  const int32_t most = most_keypoints(limits);
+  return 2 * rays_bytes(most) + guided_bytes(most) +
+         arena_bytes<tv_correspondence>(static_cast<size_t>(most));
 }
 
 }  // namespace tv

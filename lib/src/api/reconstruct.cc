@@ -1,19 +1,24 @@
-// The entry point tv_reconstruct: it calls the other entry points in a row and keeps the results at
-// the front of the arena. The merging of guided matches and the choice of the best matches are
-// here, too.
+// The entry point tv_reconstruct: it calls the other stages in a row, on one rung of effort after
+// another, and keeps the results of the last rung at the front of the arena. The merging of guided
+// matches and the choice of the best matches are here, too. docs/algorithms/effort.md.
 #include "twoview/reconstruct.h"
 
 #include <algorithm>
 #include <cstddef>
 #include <cstring>
 
+#include "api/extract.h"
+#include "api/scratch.h"
 #include "api/sized.h"
 #include "api/validate.h"
+#include "api/within.h"
+#include "feature/tilts.h"
 #include "geometry/essential.h"
 #include "geometry/triangulation.h"
 #include "image/pyramid.h"
 #include "match/align.h"
 #include "match/rank.h"
+#include "match/witness.h"
 #include "robust/verdict.h"
 #include "twoview/bundle.h"
 
@@ -24,6 +29,7 @@ namespace {
 struct Results {
   tv_keypoint* keypoints[2];
   uint8_t* descriptors[2];
+  uint8_t* tilts[2];
   double* pixels[2];
   tv_correspondence* matches;
   float* ratios;
@@ -42,24 +48,26 @@ struct Results {
   double sigma_by_size;  // the option
 };
 
-Results alloc_results(Arena& arena, int32_t max_keypoints) {
-  const size_t n = static_cast<size_t>(max_keypoints);
+Results alloc_results(Arena& arena, const tv_limits& limits) {
+  const size_t n = static_cast<size_t>(most_keypoints(limits));
+  const size_t m = static_cast<size_t>(most_chosen_matches(limits));
   Results r;
   for (int v = 0; v < 2; ++v) {
     r.keypoints[v] = arena_alloc<tv_keypoint>(arena, n);
     r.descriptors[v] = arena_alloc<uint8_t>(arena, n * TV_DESCRIPTOR_BYTES);
-    r.pixels[v] = arena_alloc<double>(arena, 2 * n);
-    r.sigmas[v] = arena_alloc<float>(arena, n);
+    r.tilts[v] = limits.max_effort < 2 ? nullptr : arena_alloc<uint8_t>(arena, n);
+    r.pixels[v] = arena_alloc<double>(arena, 2 * m);
+    r.sigmas[v] = arena_alloc<float>(arena, m);
   }
   r.matches = arena_alloc<tv_correspondence>(arena, n);
-  r.ratios = arena_alloc<float>(arena, n);
-  r.inlier_mask = arena_alloc<uint8_t>(arena, n);
-  r.points = arena_alloc<tv_point>(arena, n);
+  r.ratios = arena_alloc<float>(arena, m);
+  r.inlier_mask = arena_alloc<uint8_t>(arena, m);
+  r.points = arena_alloc<tv_point>(arena, m);
   r.more_matches = arena_alloc<tv_correspondence>(arena, n);
-  r.more_inlier_mask = arena_alloc<uint8_t>(arena, n);
-  static_assert(sizeof(tv_point) >= sizeof *r.aligned, "the points' memory is large enough");
+  r.more_inlier_mask = arena_alloc<uint8_t>(arena, m);
+  // A rung has at most 6.5 times max_keypoints, and there are at least max_keypoints points.
+  static_assert(sizeof(tv_point) >= 7 * sizeof *r.aligned, "the points' memory is large enough");
   r.aligned = reinterpret_cast<uint8_t*>(r.points);
-  std::memset(r.aligned, 0, n);
   return r;
 }
 
@@ -113,6 +121,22 @@ void gather_pixels(Results& r, const tv_correspondence* matches, int32_t num_mat
   }
 }
 
+// The views and the options of one call, as they were read.
+struct Task {
+  tv_view views[2];
+  tv_reconstruct_options options;
+  tv_estimate_options estimate;
+};
+
+// One rung of effort, and what it found; the arrays are in Results.
+struct Attempt {
+  int32_t rung;
+  int32_t num_keypoints[2];
+  int32_t num_found;  // matches of tv_match
+  int32_t num_matches, num_left_out;
+  tv_two_view estimate;
+};
+
 // Moves the keypoints of the matches by the pixels around them. A keypoint has at most one match.
 // Matches of guided matching are not aligned. It is called before the estimate, whose inlier mask
 // serves as scratch.
@@ -126,6 +150,33 @@ __attribute__((noinline)) tv_status align_matches(tv_context* context, const tv_
   if (status != TV_OK) return status;
   for (int32_t k = 0; k < num_matches; ++k) r.aligned[r.matches[k].idx0] = aligned[k];
   return TV_OK;
+}
+
+// The same on rungs with squeezed views, whose patches begin where their shapes map them, and in
+// one pass with the choice of one match a place: the most precise one, as its alignment and the
+// sizes of its keypoints say. *num_matches becomes the number of those.
+__attribute__((noinline)) void align_and_merge(tv_context* context, const Task& task, Results& r,
+                                               int32_t* num_matches) {
+  StageTimer timer(context, TV_STAGE_MATCH);
+  ArenaScope scope(context->arena);
+  float* const variances = arena_alloc<float>(context->arena, static_cast<size_t>(*num_matches));
+  for (int32_t k = 0; k < *num_matches; ++k) {
+    const tv_correspondence& m = r.matches[k];
+    tv_keypoint* const pair[2] = {&r.keypoints[0][m.idx0], &r.keypoints[1][m.idx1]};
+    int factor = 0;
+    if (task.options.align_matches != 0) {
+      double shapes[2][4];
+      patch_shape(*pair[0], r.tilts[0][m.idx0], shapes[0]);
+      patch_shape(*pair[1], r.tilts[1][m.idx1], shapes[1]);
+      factor = align_keypoints(*context->kernels, task.views[0].image, task.views[1].image,
+                               static_cast<double>(r.keypoint_size), pair[0], pair[1], shapes);
+      r.aligned[m.idx0] = static_cast<uint8_t>(factor);
+    }
+    const float of_alignment = static_cast<float>(factor == 0 ? kAlignedOne : factor) / kAlignedOne;
+    const float sizes = pair[0]->size * pair[0]->size + pair[1]->size * pair[1]->size;
+    variances[k] = sizes * (of_alignment * of_alignment);
+  }
+  *num_matches = keep_witnesses(r.keypoints, variances, r.matches, *num_matches, context->arena);
 }
 
 // Merges `matches` into `found`, which has room for both: removes the found matches that use a
@@ -196,8 +247,7 @@ __attribute__((noinline)) tv_status match_guided(tv_context* context,
   const tv_features features[2] = {features_of(r, num_keypoints, 0),
                                    features_of(r, num_keypoints, 1)};
   return tv_match_guided(context, &r.cameras[0], &r.cameras[1], estimate.E, &features[0],
-                         &features[1], nullptr, r.more_matches, context->limits.max_keypoints,
-                         count);
+                         &features[1], nullptr, r.more_matches, context->most_keypoints, count);
 }
 
 // Matches again along the epipolar lines of `estimate`, and estimates from all matches. If
@@ -212,7 +262,7 @@ __attribute__((noinline)) tv_status match_along_lines(
   int32_t count = 0;
   tv_status status = match_guided(context, num_keypoints, *estimate, r, &count);
   if (status != TV_OK) return status;
-  count = join_matches(r.matches, *num_matches, context->arena, limits.max_keypoints,
+  count = join_matches(r.matches, *num_matches, context->arena, context->most_keypoints,
                        r.more_matches, count);
   if (count == *num_matches) return TV_OK;
   const int32_t left_out = keep_best(r.more_matches, limits.max_matches, &count);
@@ -300,6 +350,8 @@ constexpr tv_reconstruct_options kDefaults = {sizeof(tv_reconstruct_options),
                                               0,
                                               1.0,
                                               1,
+                                              0,
+                                              0,
                                               0};
 
 tv_status read_reconstruct_options(const tv_reconstruct_options* options,
@@ -315,7 +367,8 @@ tv_status read_reconstruct_options(const tv_reconstruct_options* options,
                      (checked->bundle_adjustment == 0 || checked->bundle_adjustment == 1) &&
                      checked->sigma_by_size >= 0 && checked->sigma_by_size <= kMostSigmaExponent &&
                      (checked->align_matches == 0 || checked->align_matches == 1) &&
-                     checked->reserved == 0;
+                     checked->reserved == 0 && within(checked->effort, 0, kMaxEffort) &&
+                     within(checked->max_effort, 0, kMaxEffort);
   return valid ? TV_OK : TV_ERR_ARGUMENT;
 }
 
@@ -323,26 +376,44 @@ bool is_of_size(const tv_camera* camera, const tv_image& image) {
   return camera == nullptr || (camera->width == image.width && camera->height == image.height);
 }
 
+// Checks the views, and reads the options of the stages. Not inlined, for the same reason as the
+// stages.
+__attribute__((noinline)) tv_status read_task(const tv_context& context, Task* task) {
+  tv_feature_options features;
+  tv_status status = read_feature_options(context, task->options.feature, &features);
+  for (const tv_view& view : task->views) {
+    if (status == TV_OK) status = check_image(context, &view.image);
+    if (status == TV_OK) status = check_mask(view.mask, view.image);
+    if (status == TV_OK && !is_of_size(view.camera, view.image)) status = TV_ERR_CAMERA;
+    if (status != TV_OK) return status;
+    const Arena& arena = context.arena;
+    if (overlap(arena.memory, arena.size_bytes, view.image.data, image_bytes(view.image)) ||
+        (view.mask != nullptr &&
+         overlap(arena.memory, arena.size_bytes, view.mask->data, image_bytes(*view.mask)))) {
+      return TV_ERR_OVERLAP;
+    }
+  }
+  tv_estimate_options_init(&task->estimate);
+  return read_sized(task->options.estimate, &task->estimate);
+}
+
 // Extracts the keypoints of both views and matches them. Not inlined, so that its stack frame is
 // not in use during the estimate.
-__attribute__((noinline)) tv_status extract_and_match(tv_context* context, const tv_view views[2],
-                                                      const tv_reconstruct_options& options,
-                                                      Results& r, int32_t num_keypoints[2],
-                                                      int32_t* num_matches) {
-  const int32_t capacity = context->limits.max_keypoints;
-  tv_feature_options features;
-  tv_status status = read_feature_options(*context, options.feature, &features);
-  if (status != TV_OK) return status;
+__attribute__((noinline)) tv_status extract_and_match(tv_context* context, const Task& task,
+                                                      Results& r, Attempt* attempt) {
+  tv_feature_options features;  // read again, so that they are not on the stack elsewhere
+  read_feature_options(*context, task.options.feature, &features);
   r.keypoint_size = features.keypoint_size;
-  r.sigma_by_size = options.sigma_by_size;
+  r.sigma_by_size = task.options.sigma_by_size;
   for (int v = 0; v < 2; ++v) {
-    status = tv_extract(context, &views[v].image, views[v].mask, &features, r.keypoints[v],
-                        r.descriptors[v], capacity, &num_keypoints[v]);
-    if (status != TV_OK) return status;
-    if (!is_of_size(views[v].camera, views[v].image)) return TV_ERR_CAMERA;
+    RungKeypoints found = {r.keypoints[v], r.descriptors[v], r.tilts[v], 0};
+    extract_rung(context, task.views[v].image, task.views[v].mask, features, attempt->rung, &found);
+    attempt->num_keypoints[v] = found.num;
   }
-  const tv_features found[2] = {features_of(r, num_keypoints, 0), features_of(r, num_keypoints, 1)};
-  return tv_match(context, &found[0], &found[1], options.match, r.matches, capacity, num_matches);
+  const tv_features found[2] = {features_of(r, attempt->num_keypoints, 0),
+                                features_of(r, attempt->num_keypoints, 1)};
+  return tv_match(context, &found[0], &found[1], task.options.match, r.matches,
+                  context->most_keypoints, &attempt->num_found);
 }
 
 // Replaces descriptors by those of the mirrored patches; a second call restores them. A patch is
@@ -358,19 +429,23 @@ void mirror_descriptors(uint8_t* descriptors, int32_t num) {
   }
 }
 
-// Whether more of the strongest keypoints match when one picture is mirrored; the same for
-// exchanged views. docs/algorithms/two_view.md, mirrored pictures. Not inlined, so that its stack
-// frame is not in use during the estimate.
-__attribute__((noinline)) bool looks_mirrored(tv_context* context, const int32_t num_keypoints[2],
+// Whether more keypoints match when one picture is mirrored; the same for exchanged views. On rung
+// 0 the strongest are compared, on higher rungs all: there the strongest of the image as it is have
+// few matches either way. docs/algorithms/two_view.md, mirrored pictures. Not inlined, so that its
+// stack frame is not in use during the estimate.
+__attribute__((noinline)) bool looks_mirrored(tv_context* context, const Attempt& attempt,
                                               const tv_match_options* options, Results& r) {
   constexpr int32_t kStrongest = 512;
-  const int32_t strongest[2] = {std::min(num_keypoints[0], kStrongest),
-                                std::min(num_keypoints[1], kStrongest)};
+  const int32_t most = attempt.rung == 0 ? kStrongest : context->most_keypoints;
+  const int32_t strongest[2] = {std::min(attempt.num_keypoints[0], most),
+                                std::min(attempt.num_keypoints[1], most)};
   const tv_features features[2] = {features_of(r, strongest, 0), features_of(r, strongest, 1)};
-  int32_t count[2] = {0, 0};  // as they are, mirrored
-  for (int32_t& n : count) {
-    tv_match(context, &features[0], &features[1], options, r.more_matches,
-             context->limits.max_keypoints, &n);
+  int32_t count[2] = {attempt.num_found, 0};  // as they are, mirrored
+  for (int mirrored = 0; mirrored < 2; ++mirrored) {
+    if (mirrored == 1 || attempt.rung == 0) {
+      tv_match(context, &features[0], &features[1], options, r.more_matches,
+               context->most_keypoints, &count[mirrored]);
+    }
     mirror_descriptors(r.descriptors[0], strongest[0]);
   }
   return count[1] > count[0];
@@ -396,15 +471,88 @@ bool looks_repeated(const tv_match_options* options, const Results& r, int32_t n
   return 2 * alike > inliers;
 }
 
+// Runs the rung that *attempt names, up to the estimate, in which the stack is deepest.
+tv_status run_rung(tv_context* context, const Task& task, Results& r, Attempt* attempt) {
+  std::memset(r.aligned, 0, static_cast<size_t>(context->most_keypoints));
+  tv_status status = extract_and_match(context, task, r, attempt);
+  if (status != TV_OK) return status;
+  attempt->num_matches = attempt->num_found;
+  const bool has_tilts = tilts_of_rung(attempt->rung) > 1;
+  if (has_tilts) align_and_merge(context, task, r, &attempt->num_matches);
+  attempt->num_left_out = keep_best(r.matches, context->limits.max_matches, &attempt->num_matches);
+  if (!has_tilts && task.options.align_matches != 0) {
+    status = align_matches(context, task.views, attempt->num_keypoints, attempt->num_matches, r);
+    if (status != TV_OK) return status;
+  }
+  gather_pixels(r, r.matches, attempt->num_matches);
+  tv_two_view& estimate = attempt->estimate;
+  tv_two_view_init(&estimate);
+  status = tv_estimate_two_view(context, task.views[0].camera, task.views[1].camera, &r.pairs,
+                                &task.estimate, &estimate, r.inlier_mask);
+  if (status != TV_OK) return status;
+  correct_cameras(estimate, task.views[0], task.views[1], r);
+  if (estimate.verdict != TV_VERDICT_REFUSED &&
+      looks_repeated(task.options.match, r, attempt->num_matches)) {
+    doubt(TV_REASON_REPEATED_STRUCTURE, &estimate);
+  }
+  // Where a quarter of the keypoints match, the pictures are not mirrored.
+  if (estimate.verdict == TV_VERDICT_OK &&
+      4 * attempt->num_matches < std::min(attempt->num_keypoints[0], attempt->num_keypoints[1]) &&
+      looks_mirrored(context, *attempt, task.options.match, r)) {
+    doubt(TV_REASON_LOW_INLIER_RATIO, &estimate);
+  }
+  return TV_OK;
+}
+
+// How many of the matches have a ratio that wrong ones seldom have.
+int32_t num_certain(const Results& r, int32_t num_matches) {
+  constexpr float kCertain = 0.8f;
+  int32_t certain = 0;
+  for (int32_t k = 0; k < num_matches; ++k) certain += r.matches[k].ratio < kCertain;
+  return certain;
+}
+
+// Whether more keypoints or views could give what this attempt lacks. docs/algorithms/effort.md has
+// the measurements.
+bool could_help(const Results& r, const Attempt& attempt) {
+  const tv_two_view& e = attempt.estimate;
+  if (e.verdict == TV_VERDICT_OK || e.kind == TV_KIND_NO_MOTION || e.kind == TV_KIND_PANORAMIC) {
+    return false;
+  }
+  // A blank picture has nothing to match in any view.
+  constexpr int32_t kFewKeypoints = 16;
+  if (std::min(attempt.num_keypoints[0], attempt.num_keypoints[1]) < kFewKeypoints) return false;
+  if (e.kind == TV_KIND_DEGENERATE) {
+    // On rung 0 nothing tells unrelated pictures from a wall at a slant. On rung 2 there are twelve
+    // certain matches in 3 % of unrelated pairs, and the highest rung is for those that have them.
+    constexpr int32_t kFewCertain = 12;
+    return attempt.rung < 2 || num_certain(r, attempt.num_matches) >= kFewCertain;
+  }
+  // What a pose lacks by the cameras alone, in enough places, no view gives.
+  constexpr uint32_t kOfCameras = TV_REASON_LOW_PARALLAX | TV_REASON_CAMERA_CONTRADICTED;
+  constexpr int32_t kEnoughPlaces = 20;
+  return (e.reasons & ~kOfCameras) != 0 || e.num_places < kEnoughPlaces;
+}
+
+// The rung to climb to after an attempt at `rung`. Rung 1 takes longer than rung 2 and finds less;
+// it is climbed to where nothing higher is allowed.
+int32_t next_rung(int32_t rung, int32_t max_effort) {
+  return rung == 0 && max_effort >= 2 ? 2 : rung + 1;
+}
+
 // Not inlined, so that its stack frame is not in use during the estimate.
-__attribute__((noinline)) void write_reconstruction(const Results& r,
-                                                    const int32_t num_keypoints[2],
+__attribute__((noinline)) void write_reconstruction(const Results& r, const Attempt& attempt,
                                                     int32_t num_matches, int32_t num_left_out,
-                                                    int32_t num_points,
+                                                    int32_t num_points, int32_t num_rungs,
+                                                    const uint64_t rung_ns[kMaxEffort + 1],
                                                     tv_reconstruction* reconstruction) {
   tv_reconstruction packed{};
+  packed.effort = attempt.rung;
+  packed.num_rungs = num_rungs;
+  for (int k = 0; k < num_rungs; ++k) packed.rung_ns[k] = rung_ns[k];
   for (int v = 0; v < 2; ++v) {
-    packed.num_keypoints[v] = num_keypoints[v];
+    packed.tilts[v] = r.tilts[v];
+    packed.num_keypoints[v] = attempt.num_keypoints[v];
     packed.keypoints[v] = r.keypoints[v];
     packed.descriptors[v] = r.descriptors[v];
   }
@@ -437,15 +585,15 @@ tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_vie
       reconstruction == nullptr) {
     return TV_ERR_NULL;
   }
-  tv_view views[2] = {};
-  tv_reconstruct_options checked;
-  tv_status status = tv::read_sized(view0, &views[0]);
-  if (status == TV_OK) status = tv::read_sized(view1, &views[1]);
+  tv::Task task{};
+  tv_reconstruct_options& checked = task.options;
+  tv_status status = tv::read_sized(view0, &task.views[0]);
+  if (status == TV_OK) status = tv::read_sized(view1, &task.views[1]);
   if (status == TV_OK) status = tv::check_sized(two_view);
   if (status == TV_OK) status = tv::check_sized(reconstruction);
   if (status == TV_OK) status = tv::read_reconstruct_options(options, &checked);
   if (status != TV_OK) return status;
-  if (views[0].reserved != 0 || views[1].reserved != 0) return TV_ERR_ARGUMENT;
+  if (task.views[0].reserved != 0 || task.views[1].reserved != 0) return TV_ERR_ARGUMENT;
   if (tv::overlap(two_view, two_view->struct_size, reconstruction, reconstruction->struct_size)) {
     return TV_ERR_OVERLAP;
   }
@@ -453,35 +601,32 @@ tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_vie
                             (checked.guided_matching != 0 ? TV_PURPOSE_MATCH_GUIDED : 0) |
                             (checked.bundle_adjustment != 0 ? TV_PURPOSE_ADJUST : 0);
   if (!tv::made_for(*context, purposes)) return TV_ERR_LIMITS;
+  if (std::max(checked.effort, checked.max_effort) > context->limits.max_effort) {
+    return TV_ERR_EFFORT;
+  }
+  status = tv::read_task(*context, &task);
+  if (status != TV_OK) return status;
   tv::ArenaScope scope(context->arena);
-  tv::Results r = tv::alloc_results(context->arena, context->limits.max_keypoints);
-  int32_t num_keypoints[2] = {0, 0}, num_matches = 0, num_points = 0;
-  status = tv::extract_and_match(context, views, checked, r, num_keypoints, &num_matches);
-  if (status != TV_OK) return status;
-  int32_t num_left_out = tv::keep_best(r.matches, context->limits.max_matches, &num_matches);
-  if (checked.align_matches != 0) {
-    status = tv::align_matches(context, views, num_keypoints, num_matches, r);
+  tv::Results r = tv::alloc_results(context->arena, context->limits);
+  tv::Attempt attempt{};
+  uint64_t rung_ns[tv::kMaxEffort + 1] = {};
+  int32_t num_rungs = 0;
+  for (attempt.rung = checked.effort;;
+       attempt.rung = tv::next_rung(attempt.rung, checked.max_effort)) {
+    const uint64_t start_ns = tv::clock_ns(*context);
+    status = tv::run_rung(context, task, r, &attempt);
     if (status != TV_OK) return status;
+    rung_ns[num_rungs++] = tv::clock_ns(*context) - start_ns;
+    if (attempt.rung >= checked.max_effort || !tv::could_help(r, attempt)) break;
+    // Each rung's estimate has its chance to agree by accident.
+    int32_t& num_trials = task.estimate.num_trials;
+    num_trials = std::min(std::max(num_trials, 1) + 1, 10000);
   }
-  tv::gather_pixels(r, r.matches, num_matches);
-  tv_two_view estimate;
-  tv_two_view_init(&estimate);
-  status = tv_estimate_two_view(context, views[0].camera, views[1].camera, &r.pairs,
-                                checked.estimate, &estimate, r.inlier_mask);
-  if (status != TV_OK) return status;
-  tv::correct_cameras(estimate, views[0], views[1], r);
-  if (estimate.verdict != TV_VERDICT_REFUSED && tv::looks_repeated(checked.match, r, num_matches)) {
-    tv::doubt(TV_REASON_REPEATED_STRUCTURE, &estimate);
-  }
-  // Where a quarter of the keypoints match, the pictures are not mirrored.
-  if (estimate.verdict == TV_VERDICT_OK &&
-      4 * num_matches < std::min(num_keypoints[0], num_keypoints[1]) &&
-      tv::looks_mirrored(context, num_keypoints, checked.match, r)) {
-    tv::doubt(TV_REASON_LOW_INLIER_RATIO, &estimate);
-  }
+  int32_t num_matches = attempt.num_matches, num_left_out = attempt.num_left_out, num_points = 0;
+  tv_two_view& estimate = attempt.estimate;
   if (checked.guided_matching != 0 && tv::is_full_pose(estimate) && estimate.has_E != 0) {
-    status = tv::match_along_lines(context, views[0], views[1], num_keypoints, checked.estimate, r,
-                                   &num_matches, &num_left_out, &estimate);
+    status = tv::match_along_lines(context, task.views[0], task.views[1], attempt.num_keypoints,
+                                   checked.estimate, r, &num_matches, &num_left_out, &estimate);
     if (status != TV_OK) return status;
   }
   status = tv::triangulate_inliers(context, static_cast<tv_triangulation>(checked.triangulation),
@@ -492,6 +637,7 @@ tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_vie
     if (status != TV_OK) return status;
   }
   tv::write_sized(estimate, two_view);
-  tv::write_reconstruction(r, num_keypoints, num_matches, num_left_out, num_points, reconstruction);
+  tv::write_reconstruction(r, attempt, num_matches, num_left_out, num_points, num_rungs, rung_ns,
+                           reconstruction);
   return TV_OK;
 }

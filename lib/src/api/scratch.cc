@@ -3,7 +3,9 @@
 #include <algorithm>
 
 #include "feature/corners.h"
+#include "feature/tilts.h"
 #include "match/match.h"
+#include "match/witness.h"
 #include "odometry/absolute_pose.h"
 #include "robust/bundle.h"
 #include "robust/two_view.h"
@@ -19,20 +21,61 @@ size_t extract_scratch_bytes(const tv_limits& limits) {
                                   octaves_bytes(limits.max_width, limits.max_height));
 }
 
+int32_t most_keypoints(const tv_limits& limits) {
+  int32_t most = limits.max_keypoints;
+  for (int32_t rung = 1; rung <= limits.max_effort; ++rung) {
+    most = std::max(most, rung_budget(rung, limits.max_keypoints));
+  }
+  return most;
+}
+
+int32_t most_chosen_matches(const tv_limits& limits) {
+  return std::min(most_keypoints(limits), std::max(limits.max_matches, limits.max_keypoints));
+}
+
 size_t reconstruct_result_bytes(const tv_limits& limits) {
-  const size_t n = static_cast<size_t>(limits.max_keypoints);
+  const size_t n = static_cast<size_t>(most_keypoints(limits));
+  const size_t m = static_cast<size_t>(most_chosen_matches(limits));
   return 2 * (arena_bytes<tv_keypoint>(n) + arena_bytes<uint8_t>(n * TV_DESCRIPTOR_BYTES) +
-              arena_bytes<double>(2 * n) + arena_bytes<float>(n)) +
-         2 * (arena_bytes<tv_correspondence>(n) + arena_bytes<uint8_t>(n)) +
-         arena_bytes<tv_point>(n) + arena_bytes<float>(n);
+              arena_bytes<double>(2 * m) + arena_bytes<float>(m)) +
+         2 * (arena_bytes<tv_correspondence>(n) + arena_bytes<uint8_t>(m)) +
+         arena_bytes<tv_point>(m) + arena_bytes<float>(m);
+}
+
+// Of api/extract.h, extract_rung.
+size_t extract_rung_bytes(const tv_limits& limits, int32_t rung) {
+  tv_limits of_view = limits;
+  of_view.max_keypoints = view_budget(rung, 0, limits.max_keypoints);
+  size_t most = extract_scratch_bytes(of_view);
+  for (int32_t tilt = 1; tilt < tilts_of_rung(rung); ++tilt) {
+    // Of a smaller image, a view that is left out here may be used; it is not larger than this.
+    Squeeze squeeze = squeeze_of(tilt, limits.max_width, limits.max_height);
+    squeeze.width = std::min(squeeze.width, kMaxViewSide);
+    of_view.max_width = squeeze.width;
+    of_view.max_height = squeeze.height;
+    of_view.max_keypoints = view_budget(rung, tilt, limits.max_keypoints);
+    most =
+        std::max(most, squeeze_bytes(squeeze, limits.max_width) + extract_scratch_bytes(of_view));
+  }
+  return most;
+}
+
+// The rungs of effort above 0: their views, and their matches of one place.
+size_t effort_scratch_bytes(const tv_limits& limits) {
+  if (limits.max_effort == 0) return 0;
+  const size_t n = static_cast<size_t>(most_keypoints(limits));
+  size_t most = arena_bytes<float>(n) + witness_bytes(most_keypoints(limits));
+  for (int32_t rung = 1; rung <= limits.max_effort; ++rung) {
+    most = std::max(most, extract_rung_bytes(limits, rung));
+  }
+  return most;
 }
 
 size_t scratch_bytes(const tv_limits& limits) {
-  const size_t of_purpose[] = {extract_scratch_bytes(limits),
-                               match_bytes(limits.max_keypoints),
+  const size_t of_purpose[] = {extract_scratch_bytes(limits), match_bytes(most_keypoints(limits)),
                                two_view_scratch_bytes(limits.max_matches),
-                               0,  // tv_reconstruct: the bytes of its results are added below
-                               guided_scratch_bytes(limits),
+                               // tv_reconstruct: the bytes of its results are added below
+                               effort_scratch_bytes(limits), guided_scratch_bytes(limits),
                                bundle_scratch_bytes(limits.max_matches),
                                absolute_pose_bytes(limits.max_matches)};
   size_t stage = 0;

@@ -12,6 +12,12 @@ namespace tv {
 // 0).
 size_t scratch_bytes(const tv_limits& limits);
 
+// The most keypoints of an image, over the rungs of effort.
+int32_t most_keypoints(const tv_limits& limits);
+
+// How many matches of tv_reconstruct there is room for after the best were chosen.
+int32_t most_chosen_matches(const tv_limits& limits);
+
 // Parts of it: the scratch of tv_extract and of tv_match_guided, and the results of tv_reconstruct.
 size_t extract_scratch_bytes(const tv_limits& limits);
 size_t guided_scratch_bytes(const tv_limits& limits);

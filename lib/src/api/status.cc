@@ -25,6 +25,7 @@ const char *tv_status_string(tv_status status) {
     case TV_ERR_TIME: return "the time is not later than that of the frame before";
     case TV_ERR_STRIDE: return "the image's stride does not fit its width";
     case TV_ERR_MASK: return "the mask is not of its image's size";
+    case TV_ERR_EFFORT: return "the effort is above max_effort of the context's limits";
     default: return "unknown status";
   }
 }

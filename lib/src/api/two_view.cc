@@ -39,7 +39,9 @@ constexpr tv_estimate_options kDefaults = {sizeof(tv_estimate_options),
                                            0,
                                            0,
                                            0,
-                                           kReadoutTurn};
+                                           kReadoutTurn,
+                                           0,
+                                           0};
 
 // Checks the standard deviations of the cameras and of their turns, each in [0, 0.5].
 tv_status check_calibration_sigmas(const tv_estimate_options& options) {
@@ -68,13 +70,15 @@ tv_status read_estimate_options(const tv_estimate_options* options, bool calibra
                         checked->max_iterations >= 1 && checked->max_iterations <= 1000000 &&
                         checked->fixed_iterations >= 0 && checked->fixed_iterations <= 1000000 &&
                         checked->principal_point_sigma >= 0 &&
-                        checked->principal_point_sigma <= 0.1;
+                        checked->principal_point_sigma <= 0.1 && checked->num_trials >= 0 &&
+                        checked->num_trials <= 10000 && checked->reserved == 0;
   const bool with_gravity = checked->gravity_sigma_rad > 0;
   const bool method_known = checked->method == TV_SOLVER_EIGHT_POINT ||
                             checked->method == TV_SOLVER_SEVEN_POINT ||
                             (checked->method == TV_SOLVER_FIVE_POINT && calibrated) ||
                             (checked->method == TV_SOLVER_UPRIGHT && calibrated && with_gravity);
   if (!in_range || !method_known) return TV_ERR_ARGUMENT;
+  checked->num_trials = std::max(checked->num_trials, 1);
   const tv_status sigmas = check_calibration_sigmas(*checked);
   return sigmas != TV_OK
              ? sigmas

@@ -76,7 +76,7 @@ tv_status read_features(const tv_context& context, const tv_features* given, uin
   if (status != TV_OK) return status;
   if (features->num < 0) return TV_ERR_ARGUMENT;
   if (features->num > 0 && features->descriptors == nullptr) return TV_ERR_NULL;
-  if (features->num > context.limits.max_keypoints || !made_for(context, purpose)) {
+  if (features->num > context.most_keypoints || !made_for(context, purpose)) {
     return TV_ERR_LIMITS;
   }
   const size_t n = static_cast<size_t>(features->num);

@@ -9,12 +9,10 @@
 namespace tv {
 namespace {
 
-constexpr int32_t kOne = 65536;     // a pixel of the image
-constexpr int kRows = TVK_MIX_ROWS; // the rows of the image that a squeezed row lies on at most
+constexpr int32_t kOne = 65536;      // a pixel of the image
+constexpr int kRows = TVK_MIX_ROWS;  // the rows of the image that a squeezed row lies on at most
 
-int32_t to_q16(double x) {
-  return static_cast<int32_t>(x < 0 ? x * kOne - 0.5 : x * kOne + 0.5);
-}
+int32_t to_q16(double x) { return static_cast<int32_t>(x < 0 ? x * kOne - 0.5 : x * kOne + 0.5); }
 
 int32_t magnitude(int32_t x) { return x < 0 ? -x : x; }
 
@@ -33,8 +31,8 @@ Footprint footprint(const Squeeze& squeeze, int32_t v) {
     const int64_t low = std::max(begin, static_cast<int64_t>(f.first + k) * kOne);
     const int64_t high = std::min(end, static_cast<int64_t>(f.first + k + 1) * kOne);
     const int64_t share = std::max<int64_t>(high - low, 0) * 256 + squeeze.step_y / 2;
-    f.weights[k] = high == end ? rest
-                               : std::min(rest, static_cast<int32_t>(share / squeeze.step_y));
+    f.weights[k] =
+        high == end ? rest : std::min(rest, static_cast<int32_t>(share / squeeze.step_y));
     rest -= f.weights[k];
   }
   return f;
@@ -83,7 +81,8 @@ Squeeze make_squeeze(double tilt, double cosine, double sine, int32_t width, int
 
 void to_image(const Squeeze& s, double u, double v, double* x, double* y) {
   const double down = (v + 0.5) * s.step_y;  // from the upper edge
-  const double right = (u + 0.5) * s.step_x + static_cast<double>(s.first_x) + s.shear * (down / kOne);
+  const double right =
+      (u + 0.5) * s.step_x + static_cast<double>(s.first_x) + s.shear * (down / kOne);
   *x = right / kOne - 0.5;
   *y = down / kOne - 0.5;
 }

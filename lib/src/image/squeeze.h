@@ -30,9 +30,9 @@ Squeeze make_squeeze(double tilt, double cosine, double sine, int32_t width, int
 // The point (x, y) of the image that the point (u, v) of the squeezed image comes from.
 void to_image(const Squeeze& squeeze, double u, double v, double* x, double* y);
 
-// A squeezed image and its mask, 0 where a pixel is less than kSqueezeMargin pixels from the left or
-// the right edge of the image, beyond it, or masked out there. Both are valid as long as the arena
-// keeps them; squeeze_scratch is given back.
+// A squeezed image and its mask, 0 where a pixel is less than kSqueezeMargin pixels from the left
+// or the right edge of the image, beyond it, or masked out there. Both are valid as long as the
+// arena keeps them; squeeze_scratch is given back.
 inline constexpr int32_t kSqueezeMargin = 4;
 struct Squeezed {
   tv_image image, mask;

@@ -155,8 +155,8 @@ typedef struct tvk_triangulate_pair {
    average_rows: out[x] = (the sum of three rows, weighted by row_weights, + 2^15) >> 16. The
    weights are at most 255 and add up to 256, the rows are at most 65280, and width is at least 16.
 
-   squeeze_row: out[u] = 256 times the mean of a row over the interval from begin + u step to begin +
-   (u + 1) step, in 1 / 65536 of a pixel from the left edge of the row, rounded. A pixel's value
+   squeeze_row: out[u] = 256 times the mean of a row over the interval from begin + u step to begin
+   + (u + 1) step, in 1 / 65536 of a pixel from the left edge of the row, rounded. A pixel's value
    holds over its whole width, the first and the last pixel's also beyond the row. step is in
    [65536, 4 * 65536], begin and all ends of intervals are within 2^47. sums: scratch for `width`
    numbers, which are unspecified afterwards.

@@ -16,6 +16,8 @@
 #define hessian_determinants tvk_hessian_determinants_avx2
 #define average_columns tvk_average_columns_avx2
 #define average_rows tvk_average_rows_avx2
+#define squeeze_row tvk_squeeze_row_c
+#define mix_rows tvk_mix_rows_avx2
 #define halve_row tvk_halve_row_avx2
 #define blur_row tvk_blur_row_avx2
 #define pair_rows tvk_pair_rows_avx2

@@ -6,6 +6,7 @@
 
 #if defined(__x86_64__)
 TVK_LEND(average_columns, c);
+TVK_LEND(squeeze_row, c);
 TVK_LEND(sample_patch, c);
 TVK_LEND(quantize_descriptors, c);
 TVK_LEND(nearest_groups, c);

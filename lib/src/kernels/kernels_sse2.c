@@ -7,6 +7,7 @@
 
 /* These kernels are the C set's, which are as fast. */
 #define average_columns tvk_average_columns_c
+#define squeeze_row tvk_squeeze_row_c
 #define sample_patch tvk_sample_patch_c
 #define quantize_descriptors tvk_quantize_descriptors_c
 #define nearest_groups tvk_nearest_groups_c

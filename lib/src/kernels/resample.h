@@ -69,8 +69,8 @@ static void average_rows(const uint16_t *const rows[3], const int32_t row_weight
   }
 }
 
-/* The integral of a row from its left edge to x, in 1 / 65536 of a grey level and modulo 2^32, since
-   only differences are used, which are below that. */
+/* The integral of a row from its left edge to x, in 1 / 65536 of a grey level and modulo 2^32,
+   since only differences are used, which are below that. */
 static inline uint32_t integral_to(const uint8_t *row, const uint32_t *sums, int32_t last,
                                    int64_t x) {
   const int64_t pixel = x >> 16;

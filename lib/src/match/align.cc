@@ -160,6 +160,21 @@ bool compose_inverse(const double change[4], Linear* map) {
   return true;
 }
 
+// A turn, of samples `step` pixels apart.
+Linear turned(double angle_rad, double step) {
+  double sine, cosine;
+  sincos(angle_rad, &sine, &cosine);
+  return Linear{{step * cosine, -step * sine, step * sine, step * cosine}};
+}
+
+// step times what maps one patch's shape to the other's.
+Linear between(const double from[4], const double to[4], double step) {
+  const double scale = step / (from[0] * from[3] - from[1] * from[2]);
+  return Linear{
+      {(to[0] * from[3] - to[1] * from[2]) * scale, (to[1] * from[0] - to[0] * from[1]) * scale,
+       (to[2] * from[3] - to[3] * from[2]) * scale, (to[3] * from[0] - to[2] * from[1]) * scale}};
+}
+
 bool is_before(const tv_keypoint& a, const tv_keypoint& b) {
   if (a.size != b.size) return a.size > b.size;
   return a.y != b.y ? a.y < b.y : a.x < b.x;
@@ -180,7 +195,8 @@ uint8_t factor_of(const Template& t, double alike, double sample) {
 }  // namespace
 
 uint8_t align_keypoints(const tvk_table& kernels, const tv_image& image0, const tv_image& image1,
-                        double size_of_one, tv_keypoint* keypoint0, tv_keypoint* keypoint1) {
+                        double size_of_one, tv_keypoint* keypoint0, tv_keypoint* keypoint1,
+                        const double (*shapes)[4]) {
   const bool in_order = is_before(*keypoint0, *keypoint1);
   if (!in_order && !is_before(*keypoint1, *keypoint0)) return 0;
   if (image0.stride_bytes > kMostStride || image1.stride_bytes > kMostStride) return 0;
@@ -197,10 +213,11 @@ uint8_t align_keypoints(const tvk_table& kernels, const tv_image& image0, const 
   const double moving_step =
       step * static_cast<double>(moving.size) / static_cast<double>(fixed.size);
   const double inverse_step = 1 / moving_step;
-  double sine, cosine;
-  sincos(static_cast<double>(moving.angle_rad) - static_cast<double>(fixed.angle_rad), &sine,
-         &cosine);
-  Linear map{{moving_step * cosine, -moving_step * sine, moving_step * sine, moving_step * cosine}};
+  Linear map =
+      shapes != nullptr
+          ? between(shapes[in_order ? 0 : 1], shapes[in_order ? 1 : 0], step)
+          : turned(static_cast<double>(moving.angle_rad) - static_cast<double>(fixed.angle_rad),
+                   moving_step);
   const double start_x = static_cast<double>(moving.x), start_y = static_cast<double>(moving.y);
   double x = start_x, y = start_y, length = 0, first_alike = 0, alike = 0;
   for (int n = 0; n < kSteps; ++n) {

@@ -19,8 +19,11 @@ inline constexpr int kAlignedOne = 128;
 // that of the keypoints' own, in 1 / kAlignedOne, 1 to 255. Returns 0, and changes nothing, when a
 // window is not within its image, has too little texture, is not alike, or the keypoint would move
 // by more than 1.2 samples. A. W. Gruen, Adaptive least squares correlation, 1985; S. Baker, I.
-// Matthews, IJCV 2004 (inverse composition). docs/algorithms/match.md.
+// Matthews, IJCV 2004 (inverse composition). docs/algorithms/match.md. shapes: null, or the shapes
+// of both keypoints' patches (patch_shape of feature/tilts.h), which the affine map starts from in
+// place of sizes and angles.
 uint8_t align_keypoints(const tvk_table& kernels, const tv_image& image0, const tv_image& image1,
-                        double size_of_one, tv_keypoint* keypoint0, tv_keypoint* keypoint1);
+                        double size_of_one, tv_keypoint* keypoint0, tv_keypoint* keypoint1,
+                        const double (*shapes)[4] = nullptr);
 
 }  // namespace tv

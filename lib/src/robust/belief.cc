@@ -41,6 +41,8 @@ Belief belief_of(const Evidence& e) {
                {kPlaces, log(clamped(places, 1, kEnoughPlaces))},
                {kRegionShift, log(shift)}};
   double logit = kBias + (e.has_alternative ? kAlternative : 0);
+  // Of several attempts at a pair, each can be wrong by accident: the odds add up.
+  if (e.num_trials > 1) logit += log(e.num_trials);
   double most = 0;
   for (const auto& f : found) {
     logit += f.part.weight * f.value;

@@ -268,6 +268,7 @@ void measure_inliers(Fit& f) {
   evidence.num_matches = matches.num_all;
   evidence.num_different = matches.num_unique();
   evidence.threshold_px = f.threshold;
+  evidence.num_trials = f.problem.options.num_trials;
   for (int v = 0; v < 2; ++v) measure_spread(f, v, evidence);
   evidence.agreement = agreement_of(f);
 }

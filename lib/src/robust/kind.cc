@@ -92,8 +92,8 @@ tv_kind choose_kind(Fit& f, const Rivals& rivals, int sample_size) {
       log_false_alarms(n, rivals.homography_inliers, 4, 1, disc) < kLogMeaningful;
   bool epipolar_meaningful = false;
   if (epipolar.found && f.num_support > sample_size) {
-    const double limit =
-        meaningful_chance(n, f.num_support, sample_size, sample_size == 5 ? 10 : 3);
+    const int models = (sample_size == 5 ? 10 : 3) * f.problem.options.num_trials;
+    const double limit = meaningful_chance(n, f.num_support, sample_size, models);
     epipolar_meaningful = chance_of_agreement(f.matches, epipolar.M, f.threshold,
                                               f.problem.options.seed, limit) < limit;
   }

@@ -13,6 +13,7 @@ inline constexpr double kUnknown = __builtin_inf();
 struct Evidence {
   tv_kind kind = TV_KIND_DEGENERATE;
   double threshold_px = 0;
+  int num_trials = 1;  // attempts at this pair, this one included
   // Usable matches and inliers; `different` ones do not count the repeats of a match.
   int num_matches = 0, num_inliers = 0, num_different = 0, num_different_inliers = 0;
   double coverage[2] = {0, 0};  // share of an 8x8 grid on the image that holds an inlier
