@@ -87,6 +87,9 @@ std::string cards(const RoomScene& scene, const RoomModel& model, const RoomPlan
   const double all = static_cast<double>(std::max<int64_t>(1, model.pixels.total()));
   text += card(formatted("%.0f", 100 * static_cast<double>(model.pixels.measured) / all), "%",
                "of their pixels measured");
+  if (const double inferred = share_inferred(model); inferred > 0)
+    text += card(formatted("%.1f", 100 * inferred), "%",
+                 "of the surface inferred: planes carried across plain areas");
   if (model.truth)
     text += card(formatted("%.3f", model.truth->placed.f), "", "F at 5 cm beside the true surface");
   return "<div class=\"cards\">\n" + text + "</div>\n";
@@ -154,7 +157,8 @@ RoomSection room_section(const RoomScene& scene, const RoomModel& model) {
       "them.</p>\n"
       "<p class=\"hint\">Drag to turn, wheel or pinch to zoom, shift and drag to move. Walking: W "
       "A "
-      "S D or the arrows, E and Q up and down. The path is yellow." +
+      "S D or the arrows, E and Q up and down. Walls and ceiling are drawn from inside only, so "
+      "that one looks in from outside. The path is yellow." +
       coarser + "</p>\n<h2>From above</h2>\n<figure class=\"plan\">" +
       plan_svg(plan, scene, model) +
       "<figcaption>Dark lines are walls, thinner ones other upright planes, grey whatever else "

@@ -28,19 +28,19 @@ Json shares_json(const PixelCounts& p) {
           {"ambiguous", share(p.ambiguous)}};
 }
 
-double share_inferred(const RoomModel& model) {
-  if (model.vertices.empty()) return 0;
-  const auto count = std::count_if(model.vertices.begin(), model.vertices.end(),
-                                   [](const tv_room_vertex& v) { return v.inferred != 0; });
-  return static_cast<double>(count) / static_cast<double>(model.vertices.size());
-}
-
 const char* const kDirectionKeys[kNumDirections] = {"plan_right",  "plan_left", "plan_top",
                                                     "plan_bottom", "up",        "down"};
 
 std::string short_unit(const RoomScene& scene) { return scene.is_metric ? " m" : ""; }
 
 }  // namespace
+
+double share_inferred(const RoomModel& model) {
+  if (model.vertices.empty()) return 0;
+  const auto count = std::count_if(model.vertices.begin(), model.vertices.end(),
+                                   [](const tv_room_vertex& v) { return v.inferred != 0; });
+  return static_cast<double>(count) / static_cast<double>(model.vertices.size());
+}
 
 std::string unit_of(const RoomScene& scene) {
   return scene.is_metric ? "m" : "that of the path, which is not the metre";

@@ -14,6 +14,8 @@ namespace cli {
 extern const std::vector<std::string> kRoomFiles;
 
 // The unit of the scene in words: "m", or "times the distance of the first two keyframes".
+// Which part of the vertices no view measured.
+double share_inferred(const RoomModel& model);
 std::string unit_of(const RoomScene& scene);
 
 // The key `room` of result.json.

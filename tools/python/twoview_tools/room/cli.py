@@ -26,8 +26,8 @@ def arguments_of(argv):
     parser.add_argument("--true-poses", action="store_true",
                         help="the flights' exact poses in place of the odometry's")
     parser.add_argument("--voxel", type=float, default=0.03, metavar="METRES")
-    parser.add_argument("--infer", action="store_true",
-                        help="carry planes across areas without texture")
+    parser.add_argument("--measured-only", action="store_true",
+                        help="carry no planes across areas without texture")
     return parser.parse_args(argv)
 
 
@@ -35,7 +35,7 @@ def measure(folder, out, arguments):
     """The scores of one flight's room, and its times."""
     source = flight.read_flight(folder, out, arguments.true_poses)
     made = model.make(source, model.Settings(voxel=arguments.voxel,
-                                             measured_only=not arguments.infer))
+                                             measured_only=arguments.measured_only))
     boxes = surfaces.read_boxes(os.path.join(folder, "surfaces.json"))
     scale, R, t = 1.0, np.eye(3), np.zeros(3)
     if not arguments.true_poses:

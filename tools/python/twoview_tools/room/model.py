@@ -15,13 +15,14 @@ NEIGHBOURS = 120  # frames before and after a keyframe among which its partners 
 MOST_TURN = 0.35  # radians between the axes of a keyframe and a partner
 LEAST_WITNESSES = 2  # of a depth that is measured
 TRUNCATION_VOXELS = 5  # three standard deviations of a depth, 1.8 % of it in the median
+MOST_SIGMA_VOXELS = 1.5  # of surface that is kept, as in `twoview room`
 
 
 @dataclass
 class Settings:
     voxel: float = 0.03  # in the unit of the poses
     memory_mib: int = 64
-    measured_only: bool = True  # planes across plain walls are right too seldom yet
+    measured_only: bool = False  # no planes across plain walls
     min_maps: int = 2
 
 
@@ -111,19 +112,30 @@ def make(flight, settings=Settings()):
         spent_fusion += time.process_time() - begin
         keyframes.append((index, pose, arrays))
     begin = time.process_time()
-    for _, pose, arrays in keyframes:
-        try:
-            room.see_through(*pose, *arrays)
-        except tv.TV_ERR_ARGUMENT:
-            pass  # fixed by a coarser voxel
-    planes = np.zeros(0)
-    if not settings.measured_only:
-        planes = room.find_planes()
-        inferred = [(pose, room.infer(planes, *pose, *arrays)) for _, pose, arrays in keyframes]
-        for pose, (distance, sigma) in inferred:
+
+    def see_through():
+        seen = 0
+        for _, pose, arrays in keyframes:
+            try:
+                room.see_through(*pose, *arrays)
+                seen += 1
+            except tv.TV_ERR_ARGUMENT:
+                pass  # fixed by a coarser voxel
+        return seen
+
+    all_see = see_through() == len(keyframes)
+    planes = room.find_planes()
+    if not settings.measured_only and all_see:
+        for _, pose, arrays in keyframes:
+            distance, sigma = room.infer(planes, *pose, *arrays)
             if distance.any():
-                add(pose, distance, sigma, inferred=True)
-    mesh = room.mesh(measured_only=settings.measured_only, min_maps=settings.min_maps)
+                try:
+                    room.add(*pose, distance, sigma, inferred=True)
+                except tv.TV_ERR_CAPACITY:
+                    pass  # what was measured keeps the memory
+        see_through()
+    mesh = room.mesh(measured_only=settings.measured_only, min_maps=settings.min_maps,
+                     planes=planes, max_sigma=MOST_SIGMA_VOXELS * room.state.voxel)
     spent_mesh = time.process_time() - begin
     num = max(len(keyframes), 1)
     model = Model(mesh.vertices, mesh.triangles, planes, room.state.voxel, keyframes,
