@@ -42,30 +42,27 @@ uint8_t* aligned(std::vector<uint8_t>& memory) {
 
 KnownPixels::KnownPixels(const std::vector<float>& distance, const std::vector<float>& sigma,
                          const std::vector<uint8_t>& rgb)
-    : is_known_(distance.size()) {
+    : is_known_(distance.size()), rgb_(rgb) {
   for (size_t i = 0; i < distance.size(); ++i) {
     if (!(distance[i] > 0)) continue;
     is_known_[i] = true;
     distance_.push_back(distance[i]);
     sigma_.push_back(sigma[i]);
-    rgb_.insert(rgb_.end(), &rgb[3 * i], &rgb[3 * i] + 3);
   }
   distance_.shrink_to_fit();
   sigma_.shrink_to_fit();
-  rgb_.shrink_to_fit();
 }
 
 void KnownPixels::unpack(std::vector<float>& distance, std::vector<float>& sigma,
                          std::vector<uint8_t>& rgb) const {
   distance.assign(is_known_.size(), 0);
   sigma.assign(is_known_.size(), 0);
-  rgb.assign(3 * is_known_.size(), 0);
+  rgb = rgb_;
   size_t next = 0;
   for (size_t i = 0; i < is_known_.size(); ++i) {
     if (!is_known_[i]) continue;
     distance[i] = distance_[next];
     sigma[i] = sigma_[next];
-    std::copy_n(&rgb_[3 * next], 3, &rgb[3 * i]);
     ++next;
   }
 }

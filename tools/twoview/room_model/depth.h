@@ -18,13 +18,13 @@ struct RoomPicture {
   cv::Mat mask;    // of the size of luma, 0 where it shows no scene; empty: all of it does
 };
 
-// The pixels of a map whose distance is known; the others take no memory.
+// A map, of whose pixels without a distance only the colours take memory.
 class KnownPixels {
  public:
   // distance, sigma: `count` each, 0 where unknown. rgb: three times as many bytes.
   KnownPixels(const std::vector<float>& distance, const std::vector<float>& sigma,
               const std::vector<uint8_t>& rgb);
-  // The same again, with zeros in all three where the distance is unknown.
+  // The same again: colours of all pixels, because planes are carried across unknown ones.
   void unpack(std::vector<float>& distance, std::vector<float>& sigma,
               std::vector<uint8_t>& rgb) const;
   size_t num_known() const { return distance_.size(); }
