@@ -27,11 +27,11 @@ def numbers(*values):
 
 
 def mov(pictures, times_s, turn=QUARTERS[0], pixel_aspect=(1, 1), start_s=0.0, timescale=90000,
-        last_s=None, sound_only=False, index_first=False):
+        last_s=None, sound_only=False, index_first=False, fields=1):
     """pictures: PNG files in the order in which they are stored; times_s: when each is shown, in
     any order (composition offsets then say so). start_s: an empty edit before the first picture.
-    last_s: how long the last one is shown. index_first: the index stands before the pictures, so
-    that the beginning of the file is a film."""
+    last_s: how long the last one is shown. fields: 2 where the rows are of two fields. index_first:
+    the index stands before the pictures, so that the beginning of the file is a film."""
     width, height = png_size(pictures[0])
     times = [round(t * timescale) for t in times_s]
     shown = sorted(times)
@@ -51,6 +51,7 @@ def mov(pictures, times_s, turn=QUARTERS[0], pixel_aspect=(1, 1), start_s=0.0, t
         entry = atom(b"png ", bytes(6), struct.pack(">H", 1), bytes(16),
                      struct.pack(">HH", width, height), numbers(72 << 16, 72 << 16, 0),
                      struct.pack(">H", 1), bytes(32), struct.pack(">Hh", 24, -1),
+                     atom(b"fiel", bytes([fields, 9 if fields == 2 else 0])),
                      atom(b"pasp", numbers(*pixel_aspect)))
         if sound_only:
             entry = atom(b"sowt", bytes(6), struct.pack(">H", 1), bytes(8),

@@ -161,6 +161,12 @@ class Films(CliTest):
             self.assertAlmostEqual(result["truth"]["ate_rmse"], runs[0]["truth"]["ate_rmse"], 6)
         self.assertIn("the camera, of square pixels, was scaled", runs[1]["notes"][0])
 
+    def test_an_interlaced_film_is_named(self):
+        result = self.track(mov(PICTURES, TIMES, fields=2))
+        self.assert_right(result)
+        self.assertTrue(result["film"]["interlaced"])
+        self.assertIn("the film is interlaced by its container", " ".join(result["notes"]))
+
     def test_a_film_that_is_cut_off_is_tracked_as_far_as_it_goes(self):
         times = [i / 5 for i in range(COUNT)]
         whole = mov(PICTURES, times, index_first=True)

@@ -94,6 +94,7 @@ std::vector<std::string> read_video_file(const std::string& path, const TakeFram
     notes.push_back(stored + ": the camera is of such pictures");
   if (facts.pixel_aspect != 1)
     notes.push_back("the video's pixels are not square, so fx and fy of the camera differ");
+  if (facts.is_interlaced) notes.emplace_back(kInterlacedNote);
   const auto promised = static_cast<double>(video.num_promised());
   const double fps = facts.rate_hz;
   double step = fps > 1 && fps < 1000 ? fps / kLooksPerSecond : 6;

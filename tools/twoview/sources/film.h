@@ -27,9 +27,13 @@ struct FilmFacts {
   double pixel_aspect = 1;     // the width of a pixel over its height
   int64_t num_left_out = 0;    // pictures whose time is not later than that of the one before
   int64_t num_begun_anew = 0;  // how often the clock began anew, as where two films are one file
+  bool is_interlaced = false;  // by the container: the even and the odd rows may be of two moments
   double missing_s = 0;        // how much longer the film is by its header than by its pictures
 };
 const char* times_name(FilmFacts::Times times);
+constexpr const char* kInterlacedNote =
+    "the film is interlaced by its container: where its even and odd rows are of two moments, "
+    "deinterlace it first (ffmpeg -vf bwdif)";
 
 // The pictures of a film file, as they are stored: neither turned nor stretched, since a camera's
 // intrinsics refer to stored pixels, for films as for photographs.

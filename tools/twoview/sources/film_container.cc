@@ -110,6 +110,8 @@ FilmContainer read_film_container(const std::string& path) {
   result.duration_s = seconds(pictures->duration, pictures->time_base);
   const double aspect = positive(av_guess_sample_aspect_ratio(film.get(), pictures, nullptr));
   if (aspect > 0) result.pixel_aspect = aspect;
+  const AVFieldOrder order = pictures->codecpar->field_order;
+  result.is_interlaced = order != AV_FIELD_UNKNOWN && order != AV_FIELD_PROGRESSIVE;
   if (const int32_t* const matrix = display_matrix(*pictures)) add_turn(matrix, result);
   return result;
 }

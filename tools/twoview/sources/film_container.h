@@ -21,6 +21,7 @@ struct FilmContainer {
   double turn_deg = 0;  // clockwise, in [0, 360)
   bool is_mirrored = false;
   double pixel_aspect = 1;
+  bool is_interlaced = false;  // stored as two fields, which may be of two moments
 };
 
 // Throws BadInput where the file is of no format that libavformat knows.
