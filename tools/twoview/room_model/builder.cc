@@ -379,10 +379,13 @@ RoomModel RoomBuilder::finish() {
   const double before = cpu_ms();
   const bool all_see = see_through() == maps_.size();
   find_planes(model);
-  // What is inferred must stand up to all that was measured.
+  // What is inferred must stand up to all that was measured: not where memory ran out and a coarser
+  // voxel has fixed a map.
   if (!settings_.measured_only && all_see) {
     infer(model);
     see_through();
+  } else if (!settings_.measured_only) {
+    model.inferred_without_memory = static_cast<int>(maps_.size());
   }
   RoomMesh surface = mesh(model);
   model.vertices = std::move(surface.vertices);
