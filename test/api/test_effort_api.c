@@ -32,8 +32,9 @@ static double wall_at(double x, double y) {
   const int32_t w = 2 * WIDTH, h = 2 * HEIGHT;
   const int32_t left = (int32_t)floor(x), top = (int32_t)floor(y);
   const double u = x - left, v = y - top;
-  const uint8_t *p = wall + top * w + left;
+  const uint8_t *p;
   if (left < 0 || top < 0 || left + 1 >= w || top + 1 >= h) return 102;
+  p = wall + top * w + left;
   return (1 - v) * ((1 - u) * p[0] + u * p[1]) + v * ((1 - u) * p[w] + u * p[w + 1]);
 }
 
