@@ -1,7 +1,8 @@
 /* twoview: the whole way, from two images in memory to a pose and points.
 
-   It calls the stages in a row; the header of each stage names its sources. Signs and frames:
-   docs/conventions.md. */
+   It calls the stages in a row; the header of each stage names its sources. Views from the side: J.-M.
+   Morel, G. Yu, "ASIFT: a new framework for fully affine invariant image comparison", SIAM J.
+   Imaging Sciences 2(2), 2009; docs/algorithms/effort.md. Signs and frames: docs/conventions.md. */
 #ifndef TWOVIEW_RECONSTRUCT_H
 #define TWOVIEW_RECONSTRUCT_H
 
@@ -124,8 +125,9 @@ typedef struct tv_reconstruction {
   /* num_matches points; the status is TV_POINT_INVALID where the match is no inlier, and everywhere
      if there is no full pose. */
   const tv_point *points;
-  /* The rung of effort whose result this is, and how many rungs were run. */
+  /* The rung of effort whose result this is. */
   int32_t effort;
+  /* How many rungs were run. */
   int32_t num_rungs;
   /* The tilt of each keypoint of view 0 and of view 1, for tv_keypoint_shapes: 0 for the image as
      it is, 1 to 16 for the squeezed views of rungs 2 and 3. */
