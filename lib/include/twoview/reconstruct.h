@@ -1,7 +1,7 @@
 /* twoview: the whole way, from two images in memory to a pose and points.
 
-   It calls the stages in a row; the header of each stage names its sources. Views from the side: J.-M.
-   Morel, G. Yu, "ASIFT: a new framework for fully affine invariant image comparison", SIAM J.
+   It calls the stages in a row; the header of each stage names its sources. Views from the side:
+   J.-M. Morel, G. Yu, "ASIFT: a new framework for fully affine invariant image comparison", SIAM J.
    Imaging Sciences 2(2), 2009; docs/algorithms/effort.md. Signs and frames: docs/conventions.md. */
 #ifndef TWOVIEW_RECONSTRUCT_H
 #define TWOVIEW_RECONSTRUCT_H
