@@ -91,7 +91,6 @@ static void answer_timesync(tvm_session *s, int64_t asked_ns) {
   mavlink_message_t m;
   mavlink_timesync_t sync;
   int64_t uncertainty_ns;
-  uint8_t bytes[MAVLINK_MAX_PACKET_LEN];
   if (!s->sends_estimates || s->options.listen_only || !tvm_has_clock(s)) return;
   memset(&sync, 0, sizeof sync);
   sync.tc1 = s->now_ns - tvm_shift(s, &uncertainty_ns);
@@ -99,7 +98,7 @@ static void answer_timesync(tvm_session *s, int64_t asked_ns) {
   if (sync.tc1 <= 0) return;
   mavlink_msg_timesync_encode_status(tvm_own_system(s), (uint8_t)s->options.own_component,
                                      &s->sender, &m, &sync);
-  tvm_send_packet(s, bytes, mavlink_msg_to_send_buffer(bytes, &m));
+  tvm_send_message(s, &m);
 }
 
 static void take_packet(tvm_session *s, const mavlink_message_t *m) {
@@ -176,16 +175,13 @@ uint8_t tvm_own_system(const tvm_session *s) {
                                                : 1);
 }
 
-int tvm_send_packet(tvm_session *s, const uint8_t *bytes, size_t size) {
+int tvm_send_message(tvm_session *s, const mavlink_message_t *m) {
+  uint8_t bytes[MAVLINK_MAX_PACKET_LEN];
+  const size_t size = mavlink_msg_to_send_buffer(bytes, m);
   if (s->transport.send(s->transport.user, bytes, size) != TVS_OK) return 0;
   if (s->options.on_packet && s->vehicle)
     s->options.on_packet(s->options.user, s->now_ns, bytes, size);
   return 1;
-}
-
-static int send_message(tvm_session *s, const mavlink_message_t *m) {
-  uint8_t bytes[MAVLINK_MAX_PACKET_LEN];
-  return tvm_send_packet(s, bytes, mavlink_msg_to_send_buffer(bytes, m));
 }
 
 static void send_heartbeat(tvm_session *s) {
@@ -199,7 +195,7 @@ static void send_heartbeat(tvm_session *s) {
   heartbeat.mavlink_version = 3;
   mavlink_msg_heartbeat_encode_status(tvm_own_system(s), (uint8_t)s->options.own_component,
                                       &s->sender, &m, &heartbeat);
-  send_message(s, &m);
+  tvm_send_message(s, &m);
 }
 
 static void send_timesync(tvm_session *s) {
@@ -209,7 +205,7 @@ static void send_timesync(tvm_session *s) {
   sync.ts1 = s->now_ns;
   mavlink_msg_timesync_encode_status(tvm_own_system(s), (uint8_t)s->options.own_component,
                                      &s->sender, &m, &sync);
-  if (!send_message(s, &m)) return;
+  if (!tvm_send_message(s, &m)) return;
   s->sent_ns[s->idx_sent] = s->now_ns;
   s->idx_sent = (s->idx_sent + 1) % NUM_SENT_TIMES;
 }
@@ -225,7 +221,7 @@ static void send_interval(tvm_session *s, const wanted *w) {
   command.param2 = (float)(1e6 / w->hz);
   mavlink_msg_command_long_encode_status(tvm_own_system(s), (uint8_t)s->options.own_component,
                                          &s->sender, &m, &command);
-  send_message(s, &m);
+  tvm_send_message(s, &m);
 }
 
 /* Old ArduPilot knows no SET_MESSAGE_INTERVAL, only groups of messages. */
@@ -240,7 +236,7 @@ static void send_stream(tvm_session *s, uint8_t stream, double hz) {
   request.start_stop = 1;
   mavlink_msg_request_data_stream_encode_status(
       tvm_own_system(s), (uint8_t)s->options.own_component, &s->sender, &m, &request);
-  send_message(s, &m);
+  tvm_send_message(s, &m);
 }
 
 /* Requests what came less than half as often as wanted since the last call. A message that the

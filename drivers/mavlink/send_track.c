@@ -109,7 +109,6 @@ static const char *words_of(int silence) {
 static void tell(tvm_session *s, tvm_estimator *e, int silence) {
   mavlink_message_t m;
   mavlink_statustext_t text;
-  uint8_t bytes[MAVLINK_MAX_PACKET_LEN];
   if (silence == TVM_SILENCE_VELOCITY || (e->has_told && silence == e->told_silence)) return;
   if (e->has_told && s->now_ns - e->told_ns < TELL_NS) return;
   memset(&text, 0, sizeof text);
@@ -117,7 +116,7 @@ static void tell(tvm_session *s, tvm_estimator *e, int silence) {
   strncpy(text.text, words_of(silence), sizeof text.text);
   mavlink_msg_statustext_encode_status(tvm_own_system(s), (uint8_t)s->options.own_component,
                                        &s->sender, &m, &text);
-  if (!tvm_send_packet(s, bytes, mavlink_msg_to_send_buffer(bytes, &m))) return;
+  if (!tvm_send_message(s, &m)) return;
   e->has_told = 1;
   e->told_silence = silence;
   e->told_ns = s->now_ns;
@@ -162,7 +161,6 @@ tvs_status tvm_session_send_track(tvm_session *session, tvm_estimator *estimator
   tvs_time time;
   tvs_status status;
   mavlink_message_t m;
-  uint8_t bytes[MAVLINK_MAX_PACKET_LEN];
   int message, num_sent = 0;
   if (!session || !estimator || !tracked || !tracked->state) return TVS_ERR_NULL;
   if (tracked->struct_size != sizeof *tracked) return TVS_ERR_STRUCT_SIZE;
@@ -192,7 +190,7 @@ tvs_status tvm_session_send_track(tvm_session *session, tvm_estimator *estimator
                       (uint8_t)session->options.own_component, &session->sender, &m)) {
       continue;
     }
-    num_sent += tvm_send_packet(session, bytes, mavlink_msg_to_send_buffer(bytes, &m));
+    num_sent += tvm_send_message(session, &m);
   }
   return num_sent > 0 ? TVS_OK : TVS_NONE;
 }

@@ -97,8 +97,8 @@ struct tvm_session {
 void tvm_receive(tvm_session *session, const uint8_t *bytes, size_t size);
 /* The system id to send with. */
 uint8_t tvm_own_system(const tvm_session *session);
-/* Sends a packet; returns 1 if the transport took it. */
-int tvm_send_packet(tvm_session *session, const uint8_t *bytes, size_t size);
+/* Sends a message; returns 1 if the transport took it. */
+int tvm_send_message(tvm_session *session, const mavlink_message_t *message);
 void tvm_send_due(tvm_session *session);
 
 /* samples.c */

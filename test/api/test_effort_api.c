@@ -90,9 +90,7 @@ void setUp(void) {
   camera.cx = 0.5 * (WIDTH - 1);
   camera.cy = 0.5 * (HEIGHT - 1);
   for (v = 0; v < 2; ++v) {
-    tv_view_init(&views[v]);
-    views[v].image = api_image(drawn[v], WIDTH, HEIGHT, WIDTH);
-    views[v].camera = &camera;
+    views[v] = view_of(api_image(drawn[v], WIDTH, HEIGHT, WIDTH), &camera, NULL);
   }
   tv_two_view_init(&two_view);
   tv_reconstruction_init(&reconstruction);
@@ -355,6 +353,24 @@ static void test_a_later_trial_is_believed_less(void) {
   TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, run_in(a.context, 0, 0));
 }
 
+/* A rung that was climbed to is what the same rung gives as the trial that it is. */
+static void test_a_rung_that_was_climbed_to_is_a_later_trial(void) {
+  tv_estimate_options estimate;
+  double R[9], t[3];
+  int32_t rungs;
+  uint64_t climbed;
+  tv_estimate_options_init(&estimate);
+  render_wall(2, 1.25, R, t);
+  run(0, 2);
+  rungs = reconstruction.num_rungs;
+  climbed = hash_of_result();
+  TEST_ASSERT_EQUAL_INT(2, rungs);
+  options.estimate = &estimate;
+  estimate.num_trials = rungs;
+  run(2, 0);
+  TEST_ASSERT_TRUE(climbed == hash_of_result());
+}
+
 static void test_shapes_are_of_the_keypoints_views(void) {
   double R[9], t[3];
   static double shapes[4 * 7 * CAP];
@@ -491,6 +507,7 @@ int main(void) {
   RUN_TEST(test_every_kernel_set_gives_the_same_bytes_on_every_rung);
   RUN_TEST(test_exchanged_views_give_the_inverse_pose_on_every_rung);
   RUN_TEST(test_a_later_trial_is_believed_less);
+  RUN_TEST(test_a_rung_that_was_climbed_to_is_a_later_trial);
   RUN_TEST(test_shapes_are_of_the_keypoints_views);
   RUN_TEST(test_pictures_that_show_nothing_end_at_rung_0);
   RUN_TEST(test_equal_pictures_end_at_rung_0_without_motion);

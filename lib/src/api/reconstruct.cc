@@ -626,7 +626,7 @@ tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_vie
   tv_two_view& estimate = attempt.estimate;
   if (checked.guided_matching != 0 && tv::is_full_pose(estimate) && estimate.has_E != 0) {
     status = tv::match_along_lines(context, task.views[0], task.views[1], attempt.num_keypoints,
-                                   checked.estimate, r, &num_matches, &num_left_out, &estimate);
+                                   &task.estimate, r, &num_matches, &num_left_out, &estimate);
     if (status != TV_OK) return status;
   }
   status = tv::triangulate_inliers(context, static_cast<tv_triangulation>(checked.triangulation),

@@ -37,7 +37,7 @@ inline double to_level(const Level& level, double x) { return to_level(level.sca
 // that made it.
 struct LevelBuffers {
   uint8_t* pixels[2];
-  uint16_t* sums[3];  // the new columns of three source rows; row y is in sums[y % 3]
+  uint16_t* sums[3];  // the level's columns of three source rows; row y is in sums[y % 3]
   tvk_columns columns;
 };
 
