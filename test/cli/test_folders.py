@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
 """Tests of folders of pictures: their order, and what is left out of them."""
 from cli_support import CliTest, camera_yaml, main, png
-from test_odometry import COUNT, FPS, HEIGHT, PICTURES, TIMES, TUM_TRUTH, WIDTH
+from test_odometry import COUNT, FPS, HEIGHT, LUMA, PICTURES, TIMES, TUM_TRUTH, WIDTH
 
 HIDDEN = "is a hidden file (its name begins with a dot)"
+
+COPY = "is a copy of another picture, by its name and its look"
 
 
 class Folders(CliTest):
@@ -61,6 +63,40 @@ class Folders(CliTest):
         self.assertEqual(result["notes"], [
             "2 pictures of frames are left out: frame1.bmp has the name of another picture, but "
             "for the ending (so are 1 more)"])
+
+    def test_copies_are_left_out_whether_stored_anew_or_not(self):
+        self.fill()
+        anew = png(WIDTH, HEIGHT, bytes(max(v, 2) for v in LUMA[8]))
+        darker = png(WIDTH, HEIGHT, bytes(v // 2 for v in LUMA[9]))
+        for name, data in (("frame4 (1)", PICTURES[3]), ("frame5 - Copy", PICTURES[4]),
+                           ("frame6 copy 2", PICTURES[5]), ("Kopie von frame7", PICTURES[6]),
+                           ("frame8 2", PICTURES[7]), ("frame9~2", anew),
+                           ("frame10 - Copy (2)", darker)):
+            self.write(f"frames/{name}.png", data)
+        result = self.track()
+        self.assertEqual(self.names(), [f"frame{i}.png" for i in range(1, COUNT + 1)])
+        self.assertLess(result["truth"]["ate_rmse_percent_of_path"], 1)
+        self.assertEqual(result["notes"], [
+            f"7 pictures of frames are left out: Kopie von frame7.png {COPY} (so are 6 more)"])
+
+    def test_a_series_is_none_of_copies_though_it_stands_still(self):
+        """The names that a browser or Windows gives; the third picture is the second again."""
+        names = ["room.png"] + [f"room ({i}).png" for i in range(1, COUNT)]
+        for name, data in zip(names, PICTURES[:1] + PICTURES[:1] + PICTURES[2:]):
+            self.write(f"frames/{name}", data)
+        self.write("frames/room (1) copy.png", PICTURES[12])
+        result = self.track()
+        self.assertEqual(self.names()[:2] + self.names()[3:], names)
+        self.assertIn("room (1) copy.png has the name of a copy of room (1).png, but shows "
+                      "something else", " ".join(result["notes"]))
+
+    def test_two_films_in_one_folder_are_named(self):
+        self.fill()
+        for i in (3, 4):
+            self.write(f"frames/frame{i} (1).png", PICTURES[i + 9])
+        note = " ".join(self.track()["notes"])
+        self.assertIn("frame3 (1).png (and 1 more) has the name of a copy of frame3.png", note)
+        self.assertIn("where the folder holds two films", note)
 
     def test_a_link_to_nothing_is_a_missing_frame(self):
         self.fill()

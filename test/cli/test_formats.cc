@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -18,6 +19,7 @@
 #include "base/error.h"
 #include "files/camera_formats.h"
 #include "files/camera_set.h"
+#include "files/copies.h"
 #include "files/mask_file.h"
 #include "files/natural_order.h"
 #include "files/pairs_file.h"
@@ -201,6 +203,25 @@ int num_wrong_orders() {
   return wrong;
 }
 
+int num_wrong_copies() {
+  int wrong = 0;
+  const std::map<std::string, CopyMark> marks = {{"word", CopyMark::kWord},
+                                                 {"number", CopyMark::kNumber},
+                                                 {"bare number", CopyMark::kBareNumber}};
+  const Json file = load("copies.json");
+  for (const Json& test : file["cases"]) {
+    const auto name = test["name"].get<std::string>();
+    const CopyMark mark =
+        test["mark"].is_null() ? CopyMark::kNone : marks.at(test["mark"].get<std::string>());
+    const CopyName found = copy_name(name);
+    if (found.mark == mark && found.original == test["original"].get<std::string>()) continue;
+    ++wrong;
+    std::printf("copies.json: %s: %d, %s\n", name.c_str(), static_cast<int>(found.mark),
+                found.original.c_str());
+  }
+  return wrong;
+}
+
 // What a case's mask uses of the picture, row by row, or the line of the refusal.
 Json mask_json(const Json& test, const fs::path& folder) {
   fs::remove_all(folder);
@@ -253,6 +274,8 @@ void test_masks_are_read_as_the_cases_say() { TEST_ASSERT_EQUAL_INT(0, num_wrong
 
 void test_names_are_in_the_cases_order() { TEST_ASSERT_EQUAL_INT(0, num_wrong_orders()); }
 
+void test_names_of_copies_are_those_of_the_cases() { TEST_ASSERT_EQUAL_INT(0, num_wrong_copies()); }
+
 void test_pairs_files_are_read_as_the_cases_say() {
   TEST_ASSERT_EQUAL_INT(0, num_wrong("pairs.json", pairs_json));
 }
@@ -287,5 +310,6 @@ int main(void) {
   RUN_TEST(test_the_entry_that_serves_an_image_is_the_cases);
   RUN_TEST(test_masks_are_read_as_the_cases_say);
   RUN_TEST(test_names_are_in_the_cases_order);
+  RUN_TEST(test_names_of_copies_are_those_of_the_cases);
   return UNITY_END();
 }

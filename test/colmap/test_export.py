@@ -11,6 +11,7 @@ import sqlite3
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -585,15 +586,23 @@ def test_pictures_that_are_not_read_are_named(photographs, tmp_path, call, refus
 
 
 def test_hidden_and_damaged_pictures_are_left_out(photographs, tmp_path, call):
+    cv2 = pytest.importorskip("cv2")
     for name in NAMES[:2]:
         shutil.copy(photographs / "images" / name, tmp_path / name)
     (tmp_path / f"._{NAMES[0]}").write_bytes(b"\0\5\x16\7")
     (tmp_path / "zz.png").write_bytes((tmp_path / NAMES[0]).read_bytes()[:900])
+    first = Path(NAMES[0])
+    shutil.copy(tmp_path / first, tmp_path / f"{first.stem} (1){first.suffix}")
+    cv2.imwrite(str(tmp_path / f"{first.stem} - Copy{first.suffix}"),
+                cv2.imread(str(tmp_path / first)) // 2)
+    shutil.copy(tmp_path / first, tmp_path / f"{first.stem}.pgm")
     status, out, err = call("export", "--database", tmp_path / "x.db", "--images", tmp_path,
                             "--focal-35mm", "28", "--schema", "3.8", "--json")
     assert status == 0, err
     assert json.loads(out)["images"] == 2 and json.loads(out)["pairs"] == 1
-    assert f"1 picture of {tmp_path} is left out: ._{NAMES[0]} is a hidden file" in err
+    assert f"4 pictures of {tmp_path} are left out: ._{NAMES[0]} is a hidden file" in err
+    assert f"{first.stem}.pgm has the name of another picture, but for the ending" in err
+    assert "is a copy of another picture, by its name and its look (so are 1 more)" in err
     assert f"1 picture of {tmp_path} is left out: zz.png " in err
 
 

@@ -14,7 +14,7 @@ except ImportError as missing:
 from twoview_tools import formats
 from twoview_tools.colmap.errors import BadInput
 from twoview_tools.colmap.masks import Masks
-from twoview_tools.folders import natural_key
+from twoview_tools.folders import copy_name, natural_key
 
 FOLDER = pathlib.Path(__file__).resolve().parents[1] / "formats"
 
@@ -132,6 +132,13 @@ class TestNames(unittest.TestCase):
             with self.subTest(case=case["name"]):
                 for names in (case["names"][::-1], sorted(case["names"])):
                     self.assertEqual(sorted(names, key=natural_key), case["names"])
+
+
+class TestCopies(unittest.TestCase):
+    def test_names_of_copies_are_those_of_the_cases(self):
+        for case, _ in cases("copies"):
+            with self.subTest(name=case["name"]):
+                self.assertEqual(copy_name(case["name"]), (case["mark"], case["original"]))
 
 
 class TestMasks(unittest.TestCase):

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "base/error.h"
+#include "files/copies.h"
 #include "files/image_file.h"
 #include "files/image_header.h"
 #include "files/natural_order.h"
@@ -61,6 +62,19 @@ void leave_out_second_endings(FolderPictures& pictures) {
   pictures.names = std::move(kept);
 }
 
+void leave_out_copies(const fs::path& folder, FolderPictures& pictures) {
+  const Copies copies = copies_of(folder, pictures.names);
+  pictures.note = copies.note;
+  std::vector<std::string> kept;
+  for (std::string& name : pictures.names) {
+    if (std::find(copies.names.begin(), copies.names.end(), name) == copies.names.end())
+      kept.push_back(std::move(name));
+    else
+      pictures.left_out.push_back({name, "is a copy of another picture, by its name and its look"});
+  }
+  pictures.names = std::move(kept);
+}
+
 std::string size_text(cv::Size size) {
   return std::to_string(size.width) + "x" + std::to_string(size.height);
 }
@@ -111,6 +125,7 @@ FolderPictures pictures_of(const fs::path& folder) {
       result.names.push_back(name);
   }
   leave_out_second_endings(result);
+  leave_out_copies(folder, result);
   sort_sequence(result.names);
   for (const std::string& name : unread) {
     const std::string what = unread_picture_file((folder / name).string());

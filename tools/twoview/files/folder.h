@@ -23,14 +23,16 @@ std::string left_out_words(const std::vector<LeftOut>& left_out, const std::stri
 struct FolderPictures {
   std::vector<std::string> names;  // in the order of sort_sequence
   std::vector<LeftOut> left_out;
+  std::string note;  // on names of copies that are none (files/copies.h); may be empty
 };
 
 // The pictures of a folder by their endings, without those of its subfolders. Files that begin with
 // a dot (as ._0000.jpg, which macOS writes beside 0000.jpg) and pictures of formats that are not
 // read are left out, and so are second pictures of a name (0000.png beside 0000.jpg: the same
-// picture, its mask or its depths), of the ending that fewer have. A link to a file that is not
-// there is among the names, since its picture is missing. Other files are no pictures, and not
-// mentioned. Throws BadInput where the folder cannot be read.
+// picture, its mask or its depths), of the ending that fewer have, and copies ("0000 (1).jpg"
+// beside 0000.jpg, files/copies.h); tools/python/twoview_tools/folders.py is the twin of both. A
+// link to a file that is not there is among the names, since its picture is missing. Other files
+// are no pictures, and not mentioned. Throws BadInput where the folder cannot be read.
 FolderPictures pictures_of(const std::filesystem::path& folder);
 
 // Whether a file's ending is that of a picture that is read.

@@ -19,8 +19,9 @@ std::string_view take_number(std::string_view& text) {
   return digits;
 }
 
-// / first, so that the files of a folder stay together.
-int rank(char c) { return c == '/' ? 0 : 1 + static_cast<unsigned char>(c); }
+// / first, so that the files of a folder stay together; then the dot, so that a.png, to which a
+// second picture of the name is "a (1).png" or a-1.png, comes before that one.
+int rank(char c) { return c == '/' ? 0 : c == '.' ? 1 : 2 + static_cast<unsigned char>(c); }
 
 // The runs of digits of a name: begin and end of each.
 std::vector<std::pair<size_t, size_t>> runs_of(std::string_view name) {

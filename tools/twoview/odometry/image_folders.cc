@@ -286,6 +286,7 @@ void read_kitti(Folder& folder) {
     folder.frames.push_back(listed);
   }
   folder.files.push_back(times);
+  add_note(folder, pictures.note);
   add_kitti_camera(folder);
 }
 
@@ -363,6 +364,7 @@ std::unique_ptr<FrameSource> open_image_folder(const std::string& path, double f
     std::vector<std::string> kept;
     for (const Listed& listed : folder.frames) kept.push_back(listed.name);
     add_note(folder, jump_words(kept));
+    add_note(folder, pictures.note);
     add_cameras(folder);
     return std::make_unique<ImageFolder>(std::move(folder));
   }

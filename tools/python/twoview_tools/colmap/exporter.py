@@ -61,13 +61,13 @@ class Job:
 def choose_pairs(job):
     """The [Pair] to match, each pair once; all images must exist."""
     if not job.pairs:
-        names, left_out = list_images(job.images)
+        names, left_out, name_note = list_images(job.images)
         words = left_out_words(left_out, job.images)
         if len(names) < 2:
             raise BadInput(f"{job.images}: {len(names)} images in it, two and more are needed"
                            + (f"; {words}" if words else ""))
-        if words:
-            print(f"twoview: note: {words}", file=sys.stderr)
+        for note in filter(None, (words, name_note)):
+            print(f"twoview: note: {note}", file=sys.stderr)
         return sequential(names, job.overlap) if job.overlap else exhaustive(names)
     pairs, seen = [], set()
     for pair in read_pairs(job.pairs):

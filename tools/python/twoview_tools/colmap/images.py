@@ -6,28 +6,55 @@ import re
 
 import numpy as np
 
-from ..folders import natural_key
+from ..folders import copies_of, natural_key, second_endings
 from ..unread import unread_picture, unread_pictures
 from .errors import BadInput
 
-EXTENSIONS = (".png", ".jpg", ".jpeg", ".jpe", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", ".pnm",
-              ".pbm", ".webp", ".jp2")
+EXTENSIONS = (".jpg", ".jpeg", ".jpe", ".png", ".bmp", ".pgm", ".ppm", ".pnm", ".pbm", ".tif",
+              ".tiff", ".webp", ".jp2")
+_BLOCK = 8  # pixels a side, over which the brightness of possible copies is averaged
 
 
 def list_images(folder):
     """(the names of the files with one of EXTENSIONS below a folder in their natural order; [(name,
-    why)] of the pictures that are left out: hidden files and formats that are not read). As in
-    COLMAP, / separates folders."""
+    why)] of the pictures that are left out: hidden files, formats that are not read, second
+    pictures of a name and copies; a note on names, or ""). As in COLMAP, / separates folders."""
     if not os.path.isdir(folder):
         raise BadInput(f"{folder}: no such folder")
     names = sorted((os.path.relpath(os.path.join(root, file), folder).replace(os.sep, "/")
                     for root, _, files in os.walk(folder) for file in files), key=natural_key)
     pictures = [name for name in names if name.lower().endswith(EXTENSIONS)]
-    hidden = [name for name in pictures if any(part.startswith(".") for part in name.split("/"))]
-    left_out = [(name, "is a hidden file (its name begins with a dot)") for name in hidden]
-    known = set(hidden)
-    return ([name for name in pictures if name not in known],
-            left_out + unread_pictures(folder, names))
+    left_out = {name: "is a hidden file (its name begins with a dot)" for name in pictures
+                if any(part.startswith(".") for part in name.split("/"))}
+    for name in second_endings([name for name in pictures if name not in left_out], EXTENSIONS):
+        left_out[name] = "has the name of another picture, but for the ending"
+    copies, note = copies_of(folder, [name for name in pictures if name not in left_out],
+                             _correlation)
+    for name in copies:
+        left_out[name] = "is a copy of another picture, by its name and its look"
+    return ([name for name in pictures if name not in left_out],
+            list(left_out.items()) + unread_pictures(folder, names), note)
+
+
+def _correlation(path, other):
+    """The correlation of two pictures' brightness in blocks, as in tools/twoview/files/copies.cc;
+    -1 where they cannot be compared."""
+    import cv2
+    blocks = []
+    for file in (path, other):
+        try:
+            luma = read_luma(file)
+        except BadInput:
+            return -1
+        size = [max(1, side // _BLOCK) for side in luma.shape[::-1]]
+        blocks.append(cv2.resize(luma, size, interpolation=cv2.INTER_AREA).astype(float))
+    if blocks[0].shape != blocks[1].shape:
+        return -1
+    deviations = [block - block.mean() for block in blocks]
+    sigmas = [math.sqrt((deviation * deviation).mean()) for deviation in deviations]
+    if 0 in sigmas:
+        return 1 if sigmas[0] == sigmas[1] else -1
+    return float((deviations[0] * deviations[1]).mean() / (sigmas[0] * sigmas[1]))
 
 
 def _white(path):
