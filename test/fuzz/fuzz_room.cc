@@ -1,7 +1,7 @@
 // Fuzzes a room with maps of any distances, poses and options, in any order of adding, removing,
-// coarsening, seeing through, finding planes, inferring and meshing. A map that is removed leaves
-// the surface that was there before, bit for bit; each vertex of a mesh is finite and of a
-// triangle.
+// coarsening, seeing through, finding planes, inferring, and meshing with those planes. A map that
+// is removed leaves the surface that was there before, bit for bit; each vertex of a mesh is finite
+// and of a triangle.
 #include <vector>
 
 #include "fuzz.h"
@@ -120,6 +120,8 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const size_t used = bytes.whole(0, 3) == 0 ? TV_ROOM_MIN_BYTES : kMostBytes;
   if (tv_room_init(&options, memory, used, &room) != TV_OK) return 0;
   std::vector<Map> held;
+  tv_room_plane planes[TV_ROOM_MAX_PLANES];
+  int32_t num_planes = 0;
   tv_room_mesh_options all;
   tv_room_mesh_options_init(&all);
   all.min_piece_triangles = 0;
@@ -141,10 +143,11 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       tv_room_plane_options_init(&of_planes);
       of_planes.min_area = bytes.wild(0, 0.1);
       for (double& value : of_planes.gravity) value = bytes.whole(0, 1) * bytes.wild(-1, 1);
-      tv_room_plane planes[TV_ROOM_MAX_PLANES];
-      int32_t num_planes = 0, num_pixels = 0;
-      if (tv_room_find_planes(room, &of_planes, planes, TV_ROOM_MAX_PLANES, &num_planes) != TV_OK)
+      int32_t num_pixels = 0;
+      if (tv_room_find_planes(room, &of_planes, planes, TV_ROOM_MAX_PLANES, &num_planes) != TV_OK) {
+        num_planes = 0;
         continue;
+      }
       Map& m = held.back();
       std::vector<float> distance(m.distance.size()), sigma(m.distance.size());
       tv_room_infer(room, &m.camera, m.R, m.t, &m.map, planes, num_planes, nullptr, scratch,
@@ -157,6 +160,15 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       of_mesh.measured_only = bytes.whole(0, 1);
       if (bytes.whole(0, 1) == 0)
         for (int k = 0; k < 3; ++k) of_mesh.min[k] = bytes.wild(-1, 0), of_mesh.max[k] = 1;
+      // Planes that were found, perhaps before the room changed, and now and then any.
+      of_mesh.planes = planes;
+      of_mesh.num_planes = bytes.whole(0, 3) == 0 ? 0 : num_planes;
+      if (num_planes > 0 && bytes.whole(0, 7) == 0) {
+        tv_room_plane& plane = planes[bytes.whole(0, num_planes - 1)];
+        plane.offset = bytes.wild(-3, 3);
+        for (double& value : plane.normal) value = bytes.wild(-1, 1);
+      }
+      of_mesh.max_sigma = bytes.whole(0, 3) == 0 ? bytes.wild(0, 0.1) : 0;
       mesh_of(room, &of_mesh);
     }
   }
