@@ -195,6 +195,32 @@ static void test_memory_is_known_beforehand_and_rung_3_takes_16_mib_at_most_at_v
   TEST_ASSERT_TRUE(bytes_of(16384, 16384, 65535, 3, TV_PURPOSE_RECONSTRUCT) > 0);
 }
 
+/* Of large pictures with few keypoints the extraction needs most, and nothing is left over from
+   other stages: a byte that the size query forgets is a null pointer then. */
+static void test_large_pictures_have_memory_on_every_rung(void) {
+  enum { WIDE = 740, HIGH = 1290, FEW = 2000 };
+  static uint8_t large[2][WIDE * HIGH];
+  tv_camera of_large = camera;
+  tv_limits limits = limits_of(3);
+  api_context b;
+  int32_t v, rung;
+  of_large.width = limits.max_width = WIDE;
+  of_large.height = limits.max_height = HIGH;
+  limits.max_keypoints = FEW;
+  limits.purposes = TV_PURPOSE_RECONSTRUCT;
+  b = api_make(&limits);
+  for (v = 0; v < 2; ++v) {
+    api_draw(50, large[v], WIDE, HIGH);
+    views[v] = view_of(api_image(large[v], WIDE, HIGH, WIDE), &of_large, NULL);
+  }
+  memmove(large[1], large[1] + 20, sizeof large[1] - 20);
+  for (rung = 2; rung < RUNGS; ++rung) {
+    TEST_ASSERT_EQUAL_INT(TV_OK, run_in(b.context, rung, 0));
+    TEST_ASSERT_TRUE(reconstruction.num_keypoints[0] > FEW);
+  }
+  api_release(&b);
+}
+
 static void test_a_rung_of_0_gives_what_a_context_without_effort_gives(void) {
   const tv_limits limits = limits_of(0);
   api_context b = api_make(&limits);
@@ -241,39 +267,65 @@ static void test_a_wall_at_a_slant_is_matched_in_squeezed_views(void) {
   TEST_ASSERT_TRUE(two_view.num_inliers >= 15);
 }
 
+/* A stair of three depths, seen from aside. */
+static void draw_stair(uint64_t seed) {
+  int32_t x, y;
+  api_draw(seed, drawn[0], WIDTH, HEIGHT);
+  for (y = 0; y < HEIGHT; ++y) {
+    const int32_t shift = 4 + 4 * (3 * y / HEIGHT) + 3 * (y / 20 % 3);
+    for (x = 0; x < WIDTH; ++x) {
+      drawn[1][y * WIDTH + x] = drawn[0][y * WIDTH + (x + shift < WIDTH ? x + shift : WIDTH - 1)];
+    }
+  }
+}
+
+static void require_one_match_a_place(void) {
+  int32_t j, k;
+  for (k = 0; k < reconstruction.num_matches; ++k) {
+    const tv_correspondence *m = &reconstruction.matches[k];
+    const tv_keypoint *p = &reconstruction.keypoints[0][m->idx0];
+    const tv_keypoint *q = &reconstruction.keypoints[1][m->idx1];
+    for (j = 0; j < k; ++j) {
+      const tv_keypoint *p1 = &reconstruction.keypoints[0][reconstruction.matches[j].idx0];
+      const tv_keypoint *q1 = &reconstruction.keypoints[1][reconstruction.matches[j].idx1];
+      TEST_ASSERT_FALSE(fabsf(p->x - p1->x) < 2 && fabsf(p->y - p1->y) < 2 &&
+                        fabsf(q->x - q1->x) < 2 && fabsf(q->y - q1->y) < 2);
+    }
+  }
+}
+
 static void test_no_two_matches_of_squeezed_views_are_of_one_place(void) {
   double R[9], t[3];
-  int32_t rung, j, k;
+  int32_t rung;
   render_wall(3, 0.6, R, t);
   for (rung = 2; rung < RUNGS; ++rung) {
     run(rung, 0);
     TEST_ASSERT_TRUE(reconstruction.num_matches > 50);
-    for (k = 0; k < reconstruction.num_matches; ++k) {
-      const tv_correspondence *m = &reconstruction.matches[k];
-      const tv_keypoint *p = &reconstruction.keypoints[0][m->idx0];
-      const tv_keypoint *q = &reconstruction.keypoints[1][m->idx1];
-      for (j = 0; j < k; ++j) {
-        const tv_keypoint *p1 = &reconstruction.keypoints[0][reconstruction.matches[j].idx0];
-        const tv_keypoint *q1 = &reconstruction.keypoints[1][reconstruction.matches[j].idx1];
-        TEST_ASSERT_FALSE(fabsf(p->x - p1->x) < 2 && fabsf(p->y - p1->y) < 2 &&
-                          fabsf(q->x - q1->x) < 2 && fabsf(q->y - q1->y) < 2);
-      }
-    }
+    require_one_match_a_place();
+  }
+}
+
+/* Guided matching finds again, in other views, the places that are matched already. */
+/* Guided matching finds again, in other views, the places that are matched already. */
+static void test_guided_matches_of_squeezed_views_are_of_further_places(void) {
+  int32_t rung, num_matches;
+  draw_stair(7);
+  for (rung = 2; rung < RUNGS; ++rung) {
+    options.guided_matching = 0;
+    run(rung, 0);
+    num_matches = reconstruction.num_matches;
+    options.guided_matching = 1;
+    run(rung, 0);
+    TEST_ASSERT_TRUE(reconstruction.num_matches > num_matches);
+    require_one_match_a_place();
   }
 }
 
 static void test_an_easy_pair_is_left_at_rung_0(void) {
   const tv_limits limits = limits_of(0);
   api_context b = api_make(&limits);
-  int32_t x, y;
   uint64_t first;
-  api_draw(4, drawn[0], WIDTH, HEIGHT);
-  for (y = 0; y < HEIGHT; ++y) { /* a stair of three depths, seen from aside */
-    const int32_t shift = 4 + 4 * (3 * y / HEIGHT) + 3 * (y / 20 % 3);
-    for (x = 0; x < WIDTH; ++x) {
-      drawn[1][y * WIDTH + x] = drawn[0][y * WIDTH + (x + shift < WIDTH ? x + shift : WIDTH - 1)];
-    }
-  }
+  draw_stair(4);
   TEST_ASSERT_EQUAL_INT(TV_OK, run_in(b.context, 0, 0));
   TEST_ASSERT_EQUAL_INT(TV_VERDICT_OK, two_view.verdict);
   reconstruction.tilts[0] = reconstruction.tilts[1] = NULL;
@@ -500,9 +552,11 @@ int main(void) {
   RUN_TEST(test_an_effort_out_of_its_range_is_refused);
   RUN_TEST(test_limits_too_small_for_the_rung_have_a_status_of_their_own);
   RUN_TEST(test_memory_is_known_beforehand_and_rung_3_takes_16_mib_at_most_at_vga);
+  RUN_TEST(test_large_pictures_have_memory_on_every_rung);
   RUN_TEST(test_a_rung_of_0_gives_what_a_context_without_effort_gives);
   RUN_TEST(test_a_wall_at_a_slant_is_matched_in_squeezed_views);
   RUN_TEST(test_no_two_matches_of_squeezed_views_are_of_one_place);
+  RUN_TEST(test_guided_matches_of_squeezed_views_are_of_further_places);
   RUN_TEST(test_an_easy_pair_is_left_at_rung_0);
   RUN_TEST(test_every_kernel_set_gives_the_same_bytes_on_every_rung);
   RUN_TEST(test_exchanged_views_give_the_inverse_pose_on_every_rung);

@@ -6,8 +6,8 @@ build or a run fails.
 
 A digest covers keypoints, descriptors, matches, poses with covariance and evidence, E F H,
 verdicts, points of all seven triangulations with angles and errors, their covariances, guided
-matching, bundle adjustment of two views and of windows, cameras, absolute poses. No number is
-stored: builds are compared with each other."""
+matching, bundle adjustment of two views and of windows, cameras, absolute poses, and the rungs of
+effort with squeezed views. No number is stored: builds are compared with each other."""
 import argparse
 import os
 import shutil

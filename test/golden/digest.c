@@ -944,6 +944,47 @@ static void digest_reconstruct(const pair *p, tv_context *context, int32_t align
   print(p, context, stage);
 }
 
+/* Digests the rungs with squeezed views, in a context of their own, with few keypoints, since the
+   emulated ARM is slow. */
+static void digest_effort(const pair *p, const tv_limits *limits) {
+  static const int32_t keypoints_of_rung[4] = {0, 0, 200, 100};
+  tv_reconstruct_options options;
+  tv_feature_options feature;
+  tv_view view[2];
+  tv_context *context;
+  tv_limits with_effort = *limits;
+  int32_t rung;
+  int v;
+  with_effort.max_effort = 3;
+  must("context", tv_context_new(&context, &with_effort));
+  tv_feature_options_init(&feature);
+  tv_reconstruct_options_init(&options);
+  options.feature = &feature;
+  for (v = 0; v < 2; ++v) {
+    view[v] = view_of(p->image[v], &p->camera[v], NULL);
+  }
+  start();
+  for (rung = 2; rung < 4; ++rung) {
+    tv_two_view pose;
+    tv_reconstruction found;
+    options.effort = rung;
+    feature.max_keypoints = keypoints_of_rung[rung];
+    tv_two_view_init(&pose);
+    tv_reconstruction_init(&found);
+    must("effort", tv_reconstruct(context, &view[0], &view[1], &options, &pose, &found));
+    add_two_view(&pose);
+    for (v = 0; v < 2; ++v) {
+      add_keypoints(found.keypoints[v], found.descriptors[v], found.num_keypoints[v]);
+      add_bytes(found.tilts[v], (size_t)found.num_keypoints[v]);
+    }
+    add_matches(found.matches, found.num_matches);
+    add_bytes(found.inlier_mask, (size_t)found.num_matches);
+    add_points(found.points, found.num_matches);
+  }
+  print(p, context, "effort");
+  tv_context_free(context);
+}
+
 /* The context's size depends on the limits only, and the high water mark on the data only. */
 static void digest_memory(const pair *p, tv_context *context, const tv_limits *limits) {
   size_t bytes = 0;
@@ -986,6 +1027,7 @@ static void digest_pair(const pair *p, int32_t kernels) {
   if (strcmp(p->name, "scene") == 0 || strcmp(p->name, "motorcycle") == 0) {
     digest_odometry(p, context);
     digest_room(p, context);
+    digest_effort(p, &limits);
   }
   digest_reconstruct(p, context, 0, "reconstruct");
   digest_reconstruct(p, context, 1, "aligned");

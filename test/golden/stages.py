@@ -41,6 +41,7 @@ STAGES = {
     "odometry": ["odometry"],
     "reconstruct": ["reconstruct"],
     "align": ["aligned"],
+    "effort": ["effort"],
 }
 NOT_A_RESULT = {"memory"}
 

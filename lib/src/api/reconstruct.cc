@@ -152,31 +152,44 @@ __attribute__((noinline)) tv_status align_matches(tv_context* context, const tv_
   return TV_OK;
 }
 
-// The same on rungs with squeezed views, whose patches begin where their shapes map them, and in
-// one pass with the choice of one match a place: the most precise one, as its alignment and the
-// sizes of its keypoints say. *num_matches becomes the number of those.
+// Keeps one match a place of those that squeezed views found several times: the most precise one,
+// as its alignment and the sizes of its keypoints say; and before all others those of `aligned`,
+// which are among `matches`, both by ascending idx0. Returns how many are left.
+int32_t merge_places(const Results& r, Arena& arena, const tv_correspondence* aligned,
+                     int32_t num_aligned, tv_correspondence* matches, int32_t num_matches) {
+  constexpr float kBehind = 1e6f;  // no two variances differ by such a factor
+  ArenaScope scope(arena);
+  float* const variances = arena_alloc<float>(arena, static_cast<size_t>(num_matches));
+  int32_t next = 0;
+  for (int32_t k = 0; k < num_matches; ++k) {
+    const tv_keypoint& a = r.keypoints[0][matches[k].idx0];
+    const tv_keypoint& b = r.keypoints[1][matches[k].idx1];
+    const bool is_aligned = next < num_aligned && aligned[next].idx0 == matches[k].idx0;
+    next += is_aligned;
+    const int factor = r.aligned[matches[k].idx0];
+    const float of_alignment = static_cast<float>(factor == 0 ? kAlignedOne : factor) / kAlignedOne;
+    variances[k] = (a.size * a.size + b.size * b.size) * (of_alignment * of_alignment) *
+                   (is_aligned ? 1 : kBehind);
+  }
+  return keep_witnesses(r.keypoints, variances, matches, num_matches, arena);
+}
+
+// The same as align_matches on rungs with squeezed views, whose patches begin where their shapes
+// map them; then one match a place is kept. *num_matches becomes the number of those.
 __attribute__((noinline)) void align_and_merge(tv_context* context, const Task& task, Results& r,
                                                int32_t* num_matches) {
   StageTimer timer(context, TV_STAGE_MATCH);
-  ArenaScope scope(context->arena);
-  float* const variances = arena_alloc<float>(context->arena, static_cast<size_t>(*num_matches));
-  for (int32_t k = 0; k < *num_matches; ++k) {
+  for (int32_t k = 0; task.options.align_matches != 0 && k < *num_matches; ++k) {
     const tv_correspondence& m = r.matches[k];
     tv_keypoint* const pair[2] = {&r.keypoints[0][m.idx0], &r.keypoints[1][m.idx1]};
-    int factor = 0;
-    if (task.options.align_matches != 0) {
-      double shapes[2][4];
-      patch_shape(*pair[0], r.tilts[0][m.idx0], shapes[0]);
-      patch_shape(*pair[1], r.tilts[1][m.idx1], shapes[1]);
-      factor = align_keypoints(*context->kernels, task.views[0].image, task.views[1].image,
-                               static_cast<double>(r.keypoint_size), pair[0], pair[1], shapes);
-      r.aligned[m.idx0] = static_cast<uint8_t>(factor);
-    }
-    const float of_alignment = static_cast<float>(factor == 0 ? kAlignedOne : factor) / kAlignedOne;
-    const float sizes = pair[0]->size * pair[0]->size + pair[1]->size * pair[1]->size;
-    variances[k] = sizes * (of_alignment * of_alignment);
+    double shapes[2][4];
+    patch_shape(*pair[0], r.tilts[0][m.idx0], shapes[0]);
+    patch_shape(*pair[1], r.tilts[1][m.idx1], shapes[1]);
+    r.aligned[m.idx0] = static_cast<uint8_t>(
+        align_keypoints(*context->kernels, task.views[0].image, task.views[1].image,
+                        static_cast<double>(r.keypoint_size), pair[0], pair[1], shapes));
   }
-  *num_matches = keep_witnesses(r.keypoints, variances, r.matches, *num_matches, context->arena);
+  *num_matches = merge_places(r, context->arena, r.matches, *num_matches, r.matches, *num_matches);
 }
 
 // Merges `matches` into `found`, which has room for both: removes the found matches that use a
@@ -254,29 +267,32 @@ __attribute__((noinline)) tv_status match_guided(tv_context* context,
 // takes_guided_estimate accepts the second estimate, *num_matches, *num_left_out, *estimate and r's
 // matches, pixels and mask become those of the second pass; else they stay. Not inlined, like the
 // two stages below, so that its stack frame is not in use during the first estimate.
-__attribute__((noinline)) tv_status match_along_lines(
-    tv_context* context, const tv_view& view0, const tv_view& view1, const int32_t num_keypoints[2],
-    const tv_estimate_options* options, Results& r, int32_t* num_matches, int32_t* num_left_out,
-    tv_two_view* estimate) {
+__attribute__((noinline)) tv_status match_along_lines(tv_context* context, const Task& task,
+                                                      const Attempt& attempt, Results& r,
+                                                      int32_t* num_matches, int32_t* num_left_out,
+                                                      tv_two_view* estimate) {
   const tv_limits& limits = context->limits;
   int32_t count = 0;
-  tv_status status = match_guided(context, num_keypoints, *estimate, r, &count);
+  tv_status status = match_guided(context, attempt.num_keypoints, *estimate, r, &count);
   if (status != TV_OK) return status;
   count = join_matches(r.matches, *num_matches, context->arena, context->most_keypoints,
                        r.more_matches, count);
   if (count == *num_matches) return TV_OK;
+  if (tilts_of_rung(attempt.rung) > 1) {
+    count = merge_places(r, context->arena, r.matches, *num_matches, r.more_matches, count);
+  }
   const int32_t left_out = keep_best(r.more_matches, limits.max_matches, &count);
   gather_pixels(r, r.more_matches, count);
   tv_two_view again = *estimate;
-  status = tv_estimate_two_view(context, view0.camera, view1.camera, &r.pairs, options, &again,
-                                r.more_inlier_mask);
+  status = tv_estimate_two_view(context, task.views[0].camera, task.views[1].camera, &r.pairs,
+                                &task.estimate, &again, r.more_inlier_mask);
   if (status != TV_OK) return status;
   if (!takes_guided_estimate(*estimate, &again)) {
     gather_pixels(r, r.matches, *num_matches);
     return TV_OK;
   }
   *estimate = again;
-  correct_cameras(again, view0, view1, r);
+  correct_cameras(again, task.views[0], task.views[1], r);
   *num_matches = count;
   *num_left_out = left_out;
   std::copy(r.more_matches, r.more_matches + count, r.matches);
@@ -625,8 +641,8 @@ tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_vie
   int32_t num_matches = attempt.num_matches, num_left_out = attempt.num_left_out, num_points = 0;
   tv_two_view& estimate = attempt.estimate;
   if (checked.guided_matching != 0 && tv::is_full_pose(estimate) && estimate.has_E != 0) {
-    status = tv::match_along_lines(context, task.views[0], task.views[1], attempt.num_keypoints,
-                                   &task.estimate, r, &num_matches, &num_left_out, &estimate);
+    status =
+        tv::match_along_lines(context, task, attempt, r, &num_matches, &num_left_out, &estimate);
     if (status != TV_OK) return status;
   }
   status = tv::triangulate_inliers(context, static_cast<tv_triangulation>(checked.triangulation),

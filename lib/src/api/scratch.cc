@@ -36,7 +36,8 @@ int32_t most_chosen_matches(const tv_limits& limits) {
 size_t reconstruct_result_bytes(const tv_limits& limits) {
   const size_t n = static_cast<size_t>(most_keypoints(limits));
   const size_t m = static_cast<size_t>(most_chosen_matches(limits));
-  return 2 * (arena_bytes<tv_keypoint>(n) + arena_bytes<uint8_t>(n * TV_DESCRIPTOR_BYTES) +
+  const size_t tilts = limits.max_effort < 2 ? 0 : arena_bytes<uint8_t>(n);
+  return 2 * (arena_bytes<tv_keypoint>(n) + arena_bytes<uint8_t>(n * TV_DESCRIPTOR_BYTES) + tilts +
               arena_bytes<double>(2 * m) + arena_bytes<float>(m)) +
          2 * (arena_bytes<tv_correspondence>(n) + arena_bytes<uint8_t>(m)) +
          arena_bytes<tv_point>(m) + arena_bytes<float>(m);
