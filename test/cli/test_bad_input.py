@@ -263,7 +263,7 @@ class Scenes(cli.CliTest):
                         image[y * WIDTH + x] = 120 + 60 * ((x + i * y) // 5 & 1)
             return bytes(image)
 
-        done = self.reconstruct("--ratio", "0.3",
+        done = self.reconstruct("--ratio", "0.3", "--effort", "fixed",
                                 a=self.write("s0.png", png(WIDTH, HEIGHT, squares(0))),
                                 b=self.write("s1.png", png(WIDTH, HEIGHT, squares(8))))
         result = self.assert_no_pose(done)

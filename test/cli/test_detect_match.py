@@ -94,6 +94,30 @@ class Match(cli.CliTest):
         done = self.succeed(self.run_program("match", self.a, small, "-o", self.out, "--json"))
         self.assertGreater(json.loads(done.stdout)["num_matches"], 50)
 
+    def test_a_wall_at_a_slant_is_matched_in_squeezed_views(self):
+        """Image 1 is image 0 with its columns averaged by four: a wall at 76 degrees."""
+        width, height = 480, 200
+        rows = cli.texture(width // 2, height // 2, seed=3)
+        wide = [bytes(value for value in row for _ in range(2)) for row in rows for _ in range(2)]
+        slim = [bytes(sum(row[4 * x : 4 * x + 4]) // 4 for x in range(width // 4)) for row in wide]
+        images = [self.write("wide.png", cli.png(width, height, b"".join(wide))),
+                  self.write("slim.png", cli.png(width // 4, height, b"".join(slim)))]
+        found = {}
+        for effort in ("fixed", "2", "auto"):
+            done = self.succeed(self.run_program("match", *images, "-o", self.out, "--json",
+                                                 "--effort", effort))
+            found[effort] = json.loads(done.stdout)
+            rows = read_csv(self.out / "matches.csv")[1]
+            self.assertEqual(len(rows), found[effort]["num_matches"])
+            right = sum(abs(x0 - 4 * x1 - 1.5) < 4 and abs(y0 - y1) < 2
+                        for x0, y0, x1, y1, *_ in rows)
+            found[effort]["right"] = right
+        self.assertEqual([found[effort]["effort"] for effort in ("fixed", "2")], [0, 2])
+        self.assertGreaterEqual(found["auto"]["effort"], 2)
+        self.assertEqual(len(found["auto"]["timings_ms"]["rungs"]), found["auto"]["effort"])
+        self.assertGreater(found["2"]["right"], 2 * found["fixed"]["right"] + 20)
+        self.assertEqual(found["auto"]["options"]["effort"], "auto")
+
     def test_bad_images_are_refused(self):
         done = self.run_program("match", self.a, "nowhere.png", "-o", self.out)
         self.assert_refused(done, "nowhere.png")

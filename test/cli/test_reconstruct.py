@@ -15,7 +15,7 @@ from cli_support import FOCAL, HEIGHT, WIDTH
 
 RESULT_KEYS = (
     """image0 image1 num_keypoints num_matches num_matches_left_out num_inliers config verdict
-  reasons R t E F H
+  reasons effort R t E F H
 alternative evidence covariance noise_px principal_point_shift_px principal_point num_points
 median_parallax_deg rms_reprojection_px scale
 num_dense_points dense_sigma_median_percent dense_pose_sigma_median_percent
@@ -24,7 +24,7 @@ scale_sigma imu truth timings_ms context_bytes options seed version kernels""".s
 STAGES = "pyramid detect describe match estimate refine triangulate total".split()
 OPTIONS = """max_keypoints arc threshold levels scale_factor orientation descriptor ratio method
 max_error_px confidence max_iterations fixed_iterations seed kernels triangulation guided_matching
-align_matches bundle_adjustment sigma_by_size principal_point_sigma
+align_matches bundle_adjustment sigma_by_size effort principal_point_sigma
 camera0 camera1 focal_35mm resize""".split()
 TRUTH = "R: [1, 0, 0, 0, 1, 0, 0, 0, 1]\nt: [-1, 0, 0]\nbaseline: 0.5\ndepth0: depth.pfm\n"
 
@@ -53,6 +53,38 @@ class Reconstruct(cli.CliTest):
         _, out, done = Reconstruct.plain_run
         shutil.copytree(out, self.out)
         return done
+
+    def test_a_pair_that_is_ok_is_left_at_rung_0(self):
+        self.succeed(self.plain())
+        result = self.result()
+        self.assertEqual((result["verdict"], result["effort"]), ("ok", 0))
+        self.assertEqual(len(result["timings_ms"]["rungs"]), 1)
+        self.assertEqual(result["options"]["effort"], "auto")
+
+    def test_effort_runs_the_rung_that_it_names(self):
+        for name, rung in (("fixed", 0), ("0", 0), ("1", 1), ("2", 2), ("3", 3)):
+            self.succeed(self.reconstruct("--effort", name))
+            result = self.result()
+            self.assertEqual(result["effort"], rung)
+            self.assertEqual(len(result["timings_ms"]["rungs"]), 1)
+            self.assertGreater(result["timings_ms"]["rungs"][0], 0)
+            self.assertEqual(max(result["num_keypoints"]) > 2048, rung > 0)
+
+    def test_effort_is_advised_where_it_was_held_back(self):
+        """The second picture is of another texture: nothing matches."""
+        other = self.write("other.png", cli.png(WIDTH, HEIGHT, cli.stereo_pair(seed=8)[1]))
+        for name, advised in (("fixed", True), ("2", True), ("auto", False), ("3", False)):
+            done = self.run_program("reconstruct", self.a, other, "--camera", self.camera, "-o",
+                                    self.out, "--effort", name)
+            self.assertEqual(done.returncode, 3, done.stderr)
+            advice = json.loads((self.out / "result.json").read_text())["advice"]
+            self.assertEqual(any("--effort auto" in line for line in advice), advised)
+
+    def test_an_unknown_effort_is_refused(self):
+        for name in ("4", "-1", "max", ""):
+            done = self.reconstruct("--effort", name)
+            self.assertEqual(done.returncode, 2)
+            self.assertIn(b"--effort", done.stderr)
 
     def test_a_sideways_flight_gives_a_full_pose_and_every_file(self):
         done = self.succeed(self.plain())

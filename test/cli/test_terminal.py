@@ -58,7 +58,7 @@ class Terminal(cli.CliTest):
         _, shown = self.on_terminal("match", image, image, "--max-keypoints", "7000",
                                     "--threshold", "1", "--resize", "0", "--kernels", "c", "-o",
                                     self.out)
-        self.assertIn(b"at most 7000 keypoints an image: ", shown)
+        self.assertIn(b"at most 7000 keypoints a view: ", shown)
 
 
 if __name__ == "__main__":

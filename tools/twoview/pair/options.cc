@@ -23,6 +23,7 @@ const Names kOrientations = {"upright", "gradient"};
 const Names kDescriptors = {"sift", "rootsift"};
 const Names kMethods = {"five-point", "eight-point", "seven-point", "upright"};
 const Names kKernels = {"auto", "c", "sse2", "avx2", "avx512", "neon"};
+const Names kEfforts = {"fixed", "auto", "0", "1", "2", "3"};
 const Names kTriangulations = {
     "poly", "poly-abs", "linear-eigen", "linear-ls", "iterative-eigen", "iterative-ls", "midpoint"};
 
@@ -102,6 +103,9 @@ std::vector<Option> table(Options& o) {
        "1: adjust pose and points together"},
       {"sigma-by-size", kEstimate, &o.sigma_by_size, 0, 2, closed,
        "a keypoint's noise is in proportion to its size to this power; 0: the same for all"},
+      {"effort", kEffort, Choice{&o.effort, &kEfforts}, 0, 0, closed,
+       "more keypoints (1), and views squeezed along 4 (2) or 16 (3) directions; auto: only while "
+       "the verdict is not ok; fixed: 0"},
       {"gravity0", kGravity, Direction{e.gravity0}, 0, 0, closed,
        "the direction of gravity (down) in the first camera's frame"},
       {"gravity1", kGravity, Direction{e.gravity1}, 0, 0, closed, "the same of the second"},
@@ -261,6 +265,7 @@ const char* group_title(OptionGroup group) {
     case kFeature: return "Corners and descriptors";
     case kMatch: return "Matching";
     case kEstimate:
+    case kEffort:
     case kGravity: return "Geometry";
     case kTriangulate: return "Triangulation";
     default: return "General";
@@ -364,6 +369,7 @@ nlohmann::ordered_json mask_json(const Masks& masks) {
 
 void add_options(CLI::App& verb, Options& options, unsigned groups) {
   if (groups & kFeature) add_mask(verb, options.masks);
+  if (groups & kEffort) options.effort = Options::kEffortAuto;
   for (const Option& option : table(options)) {
     if (!(option.group & groups)) continue;
     CLI::Option* flag = add_option(verb, option)->group(group_title(option.group));
@@ -377,8 +383,8 @@ void exclude_matching(CLI::App& verb, CLI::Option& matches) {
   Options options;
   for (const Option& option : table(options))
     if (option.group & (kFeature | kMatch)) matches.excludes(verb.get_option(flag_of(option)));
-  for (const char* const flag :
-       {"--mask", "--guided-matching", "--align-matches", "--bundle-adjustment", "--sigma-by-size"})
+  for (const char* const flag : {"--mask", "--guided-matching", "--align-matches",
+                                 "--bundle-adjustment", "--sigma-by-size", "--effort"})
     matches.excludes(verb.get_option(flag));
 }
 

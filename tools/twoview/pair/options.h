@@ -14,6 +14,7 @@
 namespace cli {
 
 constexpr int32_t kByItself = -1, kLargeSide = 2048, kUsualSide = 1600;
+constexpr int32_t kHighestRung = 3;  // of tv_reconstruct_options.effort
 
 struct Options {
   tv_feature_options feature;
@@ -24,6 +25,9 @@ struct Options {
   int32_t align_matches = 1;
   int32_t bundle_adjustment = 0;
   double sigma_by_size = 1;
+  // How far tv_reconstruct goes. Verbs without --effort stay at rung 0.
+  enum Effort : int32_t { kEffortFixed, kEffortAuto, kEffort0, kEffort1, kEffort2, kEffort3 };
+  int32_t effort = kEffortFixed;
   int32_t kernels = TV_KERNELS_AUTO;
   // Longer side of the resized images, pixels; 0: not resized; kByItself: kUsualSide for images
   // with a longer side than kLargeSide, on which single corners are noise.
@@ -38,6 +42,9 @@ struct Options {
   Options();
   // Checks and completes the options that depend on each other. Call it once, after parsing.
   void settle();
+  // The rung to begin with, and the highest one.
+  int32_t first_rung() const { return effort >= kEffort0 ? effort - kEffort0 : 0; }
+  int32_t highest_rung() const { return effort == kEffortAuto ? kHighestRung : first_rung(); }
   // The longer side to which an image of this size is scaled down; 0: as it is.
   int32_t longer_side(int32_t width, int32_t height) const;
 };
@@ -51,7 +58,8 @@ enum OptionGroup : unsigned {
   kCommon = 16,
   kAllOptions = 31,
   kGravity = 32,  // --gravity0 and so on, for verbs with one pair
-  kResize = 64    // --resize alone, which kCommon has, too
+  kResize = 64,   // --resize alone, which kCommon has, too
+  kEffort = 128   // --effort, whose default then is "auto"
 };
 
 // Adds the flags of these groups to a verb. `options` must outlive the parsing.

@@ -27,6 +27,9 @@ uint64_t reconstruct_pair(Session& session, const Options& options, Outcome& out
   stages.align_matches = options.align_matches;
   stages.bundle_adjustment = options.bundle_adjustment;
   stages.sigma_by_size = options.sigma_by_size;
+  stages.effort = options.first_rung();
+  stages.max_effort = options.highest_rung();
+  outcome.tried_hardest = options.highest_rung() == kHighestRung;
   stages.feature = &options.feature;
   stages.match = &options.match;
   stages.estimate = &options.estimate;

@@ -302,6 +302,13 @@ Json focal_length_json(const tv_two_view& v) {
           {"uncertain", focal_length_is_uncertain(v)}};
 }
 
+Json rungs_json(const tv_reconstruction& reconstruction) {
+  Json rungs = Json::array();
+  for (int k = 0; k < reconstruction.num_rungs; ++k)
+    rungs.push_back(static_cast<double>(reconstruction.rung_ns[k]) * 1e-6);
+  return rungs;
+}
+
 Json result_json(const Outcome& outcome) {
   const tv_two_view& v = outcome.two_view;
   const tv_reconstruction& r = outcome.reconstruction;
@@ -311,6 +318,7 @@ Json result_json(const Outcome& outcome) {
   json["image_size0"] = {outcome.picture[0].luma.cols, outcome.picture[0].luma.rows};
   json["image_size1"] = {outcome.picture[1].luma.cols, outcome.picture[1].luma.rows};
   json["num_keypoints"] = {r.num_keypoints[0], r.num_keypoints[1]};
+  json["effort"] = r.effort;
   json["num_still_matches"] = v.num_still;
   json["masked_share"] = {masked_share(outcome.picture[0].mask),
                           masked_share(outcome.picture[1].mask)};
@@ -413,6 +421,10 @@ std::string reasons_in_words(const Outcome& outcome) {
 std::vector<std::string> advice_on(const Outcome& outcome) {
   std::vector<std::string> advice;
   for (const Phrase& phrase : phrases_of(outcome)) advice.push_back(phrase.advice);
+  constexpr uint32_t kWantsMatches =
+      TV_REASON_TOO_FEW_MATCHES | TV_REASON_LOW_INLIER_RATIO | TV_REASON_CROWDED_MATCHES;
+  if (!outcome.tried_hardest && (outcome.two_view.reasons & kWantsMatches) != 0)
+    advice.emplace_back("let the program try harder: --effort auto");
   return advice;
 }
 

@@ -35,6 +35,7 @@ struct Outcome {
   bool has_cameras = false;
   bool has_camera_files = false;        // the cameras are from files, not from a focal length alone
   bool estimates_focal_length = false;  // nothing was given: it is estimated with the pose
+  bool tried_hardest = true;  // the highest rung of effort was allowed, or there are no rungs
   // The cameras of the images as used: those of the camera files, scaled if the image was resized.
   tv_camera camera[2]{};
   tv_two_view two_view{};
@@ -85,6 +86,9 @@ Frustum frustum_of(const Outcome& outcome, int camera, double size);
 // Makes the content of result.json except `imu` and `truth`, which are null, and `recording`,
 // `timings_ms`, `context_bytes`, `options` and `kernels`: the caller adds these.
 nlohmann::ordered_json result_json(const Outcome& outcome);
+
+// `timings_ms.rungs`: the milliseconds of each rung of effort that was run.
+nlohmann::ordered_json rungs_json(const tv_reconstruction& reconstruction);
 
 // The test of the principal point: `chi2`, `asked_px`, `asked_covariance_px2` (null where it is not
 // known) and `shift_px`.

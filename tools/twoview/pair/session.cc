@@ -36,6 +36,7 @@ tv_context* Session::context(int width, int height, size_t max_matches) {
   max_matches_ = std::max(max_matches, max_matches_);
   limits.max_matches = static_cast<int32_t>(max_matches_);
   limits.kernels = options_.kernels;
+  limits.max_effort = options_.highest_rung();
   context_.reset();
   check(tv_context_size(&limits, &context_bytes_), "cannot make a context");
   tv_context* context = nullptr;

@@ -187,6 +187,7 @@ RecordingPair choose_pair(const std::string& folder, const RecordedFlight& fligh
             resized(camera, outcome.picture[k].luma.cols, outcome.picture[k].luma.rows);
       }
       Options own = options;
+      own.effort = Options::kEffortFixed;  // the best pair of many is one that rung 0 knows
       set_gravity(flight, frames, mount, own.estimate);
       reconstruct_pair(session, own, outcome);
       ++tried;

@@ -57,7 +57,8 @@ void bring_to_size(Picture& picture, Common& common) {
 }
 
 std::string watch_text(const Options& options) {
-  return "at most " + std::to_string(options.feature.max_keypoints) + " keypoints an image";
+  return "at most " + std::to_string(options.feature.max_keypoints) +
+         (options.highest_rung() == 0 ? " keypoints an image" : " keypoints a view");
 }
 
 Style stdout_style() {

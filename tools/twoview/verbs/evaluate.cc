@@ -167,7 +167,7 @@ PairReport evaluate_pair(Arguments& a, const Cameras& cameras, const Pair& pair,
        {"rotation_error_deg", "translation_error_deg", "translation_error_signed_deg",
         "pose_error_deg", "num_matches", "num_inliers", "precision", "config", "verdict", "reasons",
         "probability_wrong", "covariance", "principal_point_shift_px", "principal_point",
-        "camera_misfit", "time_ms"})
+        "camera_misfit", "effort", "timings_ms", "time_ms"})
     json[key] = nullptr;
   try {
     Outcome outcome;
@@ -189,6 +189,8 @@ PairReport evaluate_pair(Arguments& a, const Cameras& cameras, const Pair& pair,
     json["principal_point"] = principal_point_json(v);
     json["camera_misfit"] = camera_misfit_json(v);
     report.shift = shift_evidence(v, outcome.camera[0]);
+    json["effort"] = outcome.reconstruction.effort;
+    json["timings_ms"] = {{"rungs", rungs_json(outcome.reconstruction)}};
     json["time_ms"] = static_cast<double>(total_ns) * 1e-6;
     if (pair.has_truth) compare(pair, outcome, report);
   } catch (const BadInput& e) {
@@ -307,7 +309,7 @@ Json report_json(const Arguments& a, const std::vector<OwnPoses>& systems,
   json["systems"] = systems_json(systems, reports);
   json["pairs"] = Json::array();
   for (const PairReport& report : reports) json["pairs"].push_back(report.json);
-  json["options"] = options_json(options, kAllOptions);
+  json["options"] = options_json(options, kAllOptions | kEffort);
   json["options"]["max_pairs"] = a.max_pairs;
   a.own.add_json(json["options"]);
   json["options"]["poses"] = a.poses;
@@ -573,7 +575,7 @@ void add_evaluate(CLI::App& program, Run& run) {
       ->allow_extra_args(false);
   verb->add_flag("--tables", a->has_tables,
                  "also write pairs.csv, and systems.csv and systems.tex (LaTeX)");
-  add_common(*verb, a->common, kAllOptions, "folder for report.json, or the file itself");
+  add_common(*verb, a->common, kAllOptions | kEffort, "folder for report.json, or the file itself");
   a->own.add_to(*verb,
                 "folder with the matches of each pair by another program, in place of twoview's: "
                 "NAME0_NAME1_matches.npz and the like, or .csv",

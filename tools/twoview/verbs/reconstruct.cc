@@ -213,7 +213,7 @@ ImageCameras load_inputs(Arguments& a, RecordingInput* recording, Session& sessi
 }
 
 nlohmann::ordered_json options_of(const Arguments& a) {
-  nlohmann::ordered_json json = options_json(a.common.options, kAllOptions | kGravity);
+  nlohmann::ordered_json json = options_json(a.common.options, kAllOptions | kEffort | kGravity);
   const std::array<std::string, 2> files = a.cameras.files();
   for (size_t i = 0; i < 2; ++i) {
     const std::string key = "camera" + std::to_string(i);
@@ -360,6 +360,9 @@ std::string summary(const Outcome& outcome, const RecordingInput* recording, con
                          100 * v.probability_wrong,
                          focal_length_is_uncertain(v) ? ", if the focal length is right" : "");
   text += summary_line("keypoints", "%d and %d", r.num_keypoints[0], r.num_keypoints[1]);
+  if (r.effort > 0)
+    text += summary_line("effort", "rung %d, after %d %s", r.effort, r.num_rungs,
+                         r.num_rungs == 1 ? "rung" : "rungs");
   text += summary_line("matches", "%d, of which %d agree (%.0f %%)", v.num_matches, v.num_inliers,
                        v.num_matches ? 100.0 * v.num_inliers / v.num_matches : 0.0);
   if (r.num_matches_left_out > 0)
@@ -469,6 +472,7 @@ int reconstruct(Arguments& a) {
   if (has_truth && outcome.dense)
     add_dense_truth(truth, outcome.picture[0], *outcome.dense, outcome.json["truth"]);
   outcome.json["timings_ms"] = session.take_times(total_ns + dense_ns, true);
+  outcome.json["timings_ms"]["rungs"] = rungs_json(outcome.reconstruction);
   if (outcome.dense) outcome.json["timings_ms"]["dense"] = static_cast<double>(dense_ns) * 1e-6;
   outcome.json["context_bytes"] = session.context_bytes();
   outcome.json["cameras"] = cameras_json(cameras);
@@ -513,7 +517,7 @@ void add_reconstruct(CLI::App& program, Run& run) {
       ->type_name("N")
       ->check(CLI::Range(0, kMostDensePoints));
 #endif
-  add_common(*verb, a->common, kAllOptions | kGravity, "folder for the results");
+  add_common(*verb, a->common, kAllOptions | kEffort | kGravity, "folder for the results");
   a->own.add_to(*verb,
                 "matches of A and B by another program, in place of twoview's: .npz, .npy, or a "
                 "table of x0 y0 x1 y1 and perhaps a score",
