@@ -97,6 +97,9 @@ def _add_export(verbs):
     parser.add_argument("--schema", choices=("4", "3.8"), default="4",
                         help="COLMAP 4, or 3.8 as Debian has it (default: 4)")
     parser.add_argument("--append", action="store_true", help="add to a database that is there")
+    parser.add_argument("--effort", choices=tuple(settings.EFFORTS), default="auto",
+                        help="try pairs that are not ok with squeezed views, too (auto), or with "
+                             "one rung alone; fixed: 0 (default: auto)")
     settings.add_options(parser, max_keypoints=settings.MAPPING_KEYPOINTS,
                          principal_point_sigma=settings.PRINCIPAL_POINT_SIGMA_OF_A_DATABASE)
     parser.set_defaults(run=_export)
@@ -118,6 +121,7 @@ def _export(arguments):
         arguments.focal_35mm,
         arguments.resize,
         arguments.mask,
+        arguments.effort,
     )
     counts = export(job, *(settings.options_of(arguments, kind) for kind in
                            (tv.FeatureOptions, tv.MatchOptions, tv.EstimateOptions)))

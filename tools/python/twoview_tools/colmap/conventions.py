@@ -69,13 +69,16 @@ def camera_from_colmap(camera, name):
                                       name)
 
 
-def keypoints_to_colmap(keypoints):
+def keypoints_to_colmap(keypoints, tilts=None):
     """Keypoints as (n, 6) float32, x y a11 a12 a21 a22, the form that COLMAP's own extractor
-    writes."""
+    writes. tilts: of keypoints of squeezed views, whose patches are no squares."""
     x, y, angle = (keypoints[name].astype(np.float64) for name in ("x", "y", "angle_rad"))
     scale = keypoints["size"].astype(np.float64) / 2
     cos, sin = scale * np.cos(angle), scale * np.sin(angle)
-    columns = [x + HALF_PIXEL, y + HALF_PIXEL, cos, -sin, sin, cos]
+    shape = [cos, -sin, sin, cos]
+    if tilts is not None:
+        shape = (tv.keypoint_shapes(keypoints, tilts).reshape(-1, 4) / 2).T
+    columns = [x + HALF_PIXEL, y + HALF_PIXEL, *shape]
     return np.column_stack(columns).astype(np.float32).reshape(-1, 6)
 
 

@@ -7,13 +7,14 @@ from .errors import BadInput
 
 
 class Engine:
-    def __init__(self, feature=None, match=None, estimate=None, max_matches=0):
+    def __init__(self, feature=None, match=None, estimate=None, max_matches=0, rungs=(0, 0)):
+        """rungs: the rung of effort to begin with, and the highest one, of `climb`."""
         self.feature, self.match_options = (
             feature or tv.FeatureOptions(),
             match or tv.MatchOptions(),
         )
         self.estimate_options = estimate or tv.EstimateOptions()
-        self.max_matches = max_matches
+        self.max_matches, self.rungs = max_matches, rungs
         self.width = self.height = 0
         self.context = None
 
@@ -22,7 +23,7 @@ class Engine:
             self.width, self.height = max(width, self.width), max(height, self.height)
             self.context = tv.Context(max_width=self.width, max_height=self.height,
                                       max_keypoints=max(self.feature.max_keypoints or 2048, 1),
-                                      max_matches=self.max_matches)
+                                      max_matches=self.max_matches, max_effort=self.rungs[1])
         return self.context
 
     def extract(self, luma, name, mask=None):
@@ -51,6 +52,21 @@ class Engine:
                 ratios,
                 options or self.estimate_options,
             )
+        except tv.StatusError as error:
+            raise BadInput(str(error)) from None
+
+
+    def climb(self, views):
+        """tv.reconstruct with the engine's rungs, of two (luma, mask, camera). Keypoints stay where
+        they were found. Returns (TwoView, Reconstruction)."""
+        (luma0, mask0, camera0), (luma1, mask1, camera1) = views
+        width, height = (max(luma0.shape[i], luma1.shape[i]) for i in (1, 0))
+        try:
+            return tv.reconstruct(
+                self._context(width, height), luma0, camera0, luma1, camera1, mask0=mask0,
+                mask1=mask1, feature=self.feature, match=self.match_options,
+                estimate=self.estimate_options, align_matches=False, effort=self.rungs[0],
+                max_effort=self.rungs[1])
         except tv.StatusError as error:
             raise BadInput(str(error)) from None
 

@@ -1,6 +1,8 @@
 """Exports images to a COLMAP database: features, matches and verified geometry, which COLMAP's
-mapper then uses."""
+mapper then uses. Pairs that are not "ok" are tried with effort: the keypoints of squeezed views
+that their inliers need stand behind those of the image."""
 
+import functools
 import os
 import sys
 from dataclasses import dataclass
@@ -29,7 +31,12 @@ from .images import list_images, read_luma, shrunk
 from .masks import Masks, shrunk_mask
 from .pairs import exhaustive, read_pairs, sequential
 from .progress import progress
-from .settings import PRINCIPAL_POINT_SIGMA_OF_A_DATABASE
+from .settings import EFFORTS, PRINCIPAL_POINT_SIGMA_OF_A_DATABASE
+
+PICTURES_IN_MEMORY = 16
+# A keypoint of a squeezed view that is as near to one of the database is that one, so that tracks
+# of several pairs meet.
+ONE_KEYPOINT_PX = 1.0
 
 
 @dataclass(frozen=True)
@@ -39,6 +46,10 @@ class View:
     camera: Any
     keypoints: np.ndarray
     descriptors: np.ndarray
+
+    @functools.cached_property
+    def places(self):
+        return one_keypoint_a_place(self.keypoints)
 
 
 @dataclass(frozen=True)
@@ -56,6 +67,28 @@ class Job:
     #: which is as 0 with a note where the first image is large
     resize: Optional[int] = None
     mask: str = ""  #: a file for all images, or a folder of masks; empty: none
+    effort: str = "auto"  #: of settings.EFFORTS
+
+
+class Pictures:
+    """The pixels and masks of the images, the last few of which stay in memory."""
+
+    def __init__(self, job):
+        self.job, self.masks = job, Masks(job.mask)
+        self.used = functools.lru_cache(PICTURES_IN_MEMORY)(self._used)
+
+    def whole(self, name):
+        return read_luma(os.path.join(self.job.images, name))
+
+    def at_size(self, name, luma):
+        """(luma, mask or None) as they are used, of the whole image."""
+        mask = self.masks.of(name, luma)
+        if not self.job.resize:
+            return luma, mask
+        return shrunk(luma, self.job.resize), shrunk_mask(mask, self.job.resize)
+
+    def _used(self, name):
+        return self.at_size(name, self.whole(name))
 
 
 def choose_pairs(job):
@@ -100,28 +133,26 @@ def _advise_on_size(name, luma):
               f"{name} is {width}x{height}; --resize {USUAL_SIDE} is advised", file=sys.stderr)
 
 
-def _describe_images(job, pairs, engine):
+def _describe_images(job, pairs, engine, pictures):
     """{name: View} of the pairs' images. One that cannot be read is left out, and named in a note;
     BadInput where no pair is left."""
     folders = [os.path.dirname(os.path.abspath(job.pairs))] if job.pairs else []
     folders += [job.images, os.path.dirname(os.path.abspath(job.images))]
     choice = CameraChoice(job.cameras, folders, job.focal_35mm)
-    views, masks, left_out = {}, Masks(job.mask), []
+    views, left_out = {}, []
     intrinsics = _intrinsics(job, pairs)
     for name, K in progress(intrinsics.items(), "image", job.quiet):
         path = os.path.join(job.images, name)
         try:
-            luma = read_luma(path)
+            luma = pictures.whole(name)
         except BadInput as error:
             left_out.append((name, str(error).removeprefix(f"image {path}").lstrip(": ")))
             continue
         if job.resize is None and not views:
             _advise_on_size(name, luma)
         camera = choice.of(name, luma.shape[1], luma.shape[0], K)
-        mask = masks.of(name, luma)
+        luma, mask = pictures.at_size(name, luma)
         if job.resize:
-            mask = shrunk_mask(mask, job.resize)
-            luma = shrunk(luma, job.resize)
             camera = resized(camera, luma.shape[1], luma.shape[0])
         views[name] = View(camera, *engine.extract(luma, name, mask))
     words = left_out_words(left_out, job.images)
@@ -147,34 +178,84 @@ class _Known:
 
     def check_image(self, name, camera, keypoints):
         """Refuses an image in the database that differs from this run's, since its matches would
-        refer to other keypoints."""
+        refer to other keypoints. Returns its id and its keypoints; behind this run's stand those
+        that earlier runs needed of squeezed views."""
         image_id, camera_id = self.images[name]
         if self.cameras.get(camera_id) != camera:
             raise BadInput(f"{self.path}: image {name} is there with another camera")
         with reading(self.path) as database:
             stored = read_keypoints(database, self.path, image_id)
-        if stored.shape != keypoints.shape or not np.array_equal(stored, keypoints):
+        if not np.array_equal(stored[:len(keypoints)], keypoints):
             raise BadInput(f"{self.path}: image {name} is there with other keypoints")
-        return image_id
+        return image_id, stored
+
+
+class Keypoints:
+    """The keypoints of an image as the database gets them, in COLMAP's form: its own, and behind
+    them those of squeezed views that an inlier needs. `stored`: those of an image that is in the
+    database already, to which none is added."""
+
+    def __init__(self, view, stored=None):
+        self.is_stored = stored is not None
+        own = conventions.keypoints_to_colmap(view.keypoints)
+        self.rows = [stored if self.is_stored else own]
+        self.descriptors = [view.descriptors]
+
+    @property
+    def table(self):
+        if len(self.rows) > 1:
+            self.rows, self.descriptors = ([np.concatenate(parts)] for parts in
+                                           (self.rows, self.descriptors))
+        return self.rows[0]
+
+    def indices_of(self, keypoints, tilts, descriptors):
+        """For each keypoint of any view its index, -1 where there is none and none is added."""
+        from scipy.spatial import cKDTree
+        rows = conventions.keypoints_to_colmap(keypoints, tilts)
+        known = len(self.table)
+        far, found = np.full(len(rows), np.inf), np.full(len(rows), -1)
+        if known and len(rows):
+            far, found = cKDTree(self.table[:, :2]).query(rows[:, :2])
+        found = np.where(far <= ONE_KEYPOINT_PX, found, -1)
+        if self.is_stored:
+            return found
+        new, added = np.flatnonzero(found < 0), []
+        for k in new:
+            near = [i for i in added if np.hypot(*(rows[i, :2] - rows[k, :2])) <= ONE_KEYPOINT_PX]
+            found[k] = found[near[0]] if near else known + len(added)
+            if not near:
+                added.append(k)
+        if added:
+            self.rows.append(rows[added])
+            self.descriptors.append(descriptors[added])
+        return found
 
 
 def _write_images(writer, known, views):
-    """Writes the images that the database does not hold yet, and checks the others. Returns
-    {name: image_id}."""
-    ids = {}
+    """Writes the images that the database does not hold yet, without their keypoints, and checks
+    the others. Returns {name: image_id} and {name: Keypoints}."""
+    ids, tables = {}, {}
     for name, view in views.items():
         camera = conventions.camera_to_colmap(view.camera)
-        keypoints = conventions.keypoints_to_colmap(view.keypoints)
         if name in known.images:
-            ids[name] = known.check_image(name, camera, keypoints)
+            keypoints = conventions.keypoints_to_colmap(view.keypoints)
+            ids[name], stored = known.check_image(name, camera, keypoints)
+            tables[name] = Keypoints(view, stored)
             continue
         camera_id = known.camera_id(camera)
         if camera_id is None:
             camera_id = writer.add_camera(camera)
             known.cameras[camera_id] = camera
         ids[name] = writer.add_image(name, camera_id)
-        writer.add_features(ids[name], keypoints, view.descriptors)
-    return ids
+        tables[name] = Keypoints(view)
+    return ids, tables
+
+
+def _write_keypoints(writer, ids, tables):
+    for name, found in tables.items():
+        if not found.is_stored:
+            table = found.table
+            writer.add_features(ids[name], table, found.descriptors[0])
 
 
 def one_keypoint_a_place(keypoints):
@@ -206,31 +287,69 @@ def two_view(engine, view0, view1):
     result, inliers = engine.estimate(
         view0.camera, view1.camera, pixels_of(view0.keypoints)[matches[:, 0]],
         pixels_of(view1.keypoints)[matches[:, 1]], found["ratio"].copy())
-    matches = np.column_stack([one_keypoint_a_place(view.keypoints)[matches[:, i]]
+    matches = np.column_stack([view.places[matches[:, i]]
                                for i, view in enumerate((view0, view1))])
     kept = one_to_one(matches, np.lexsort((found["ratio"], ~inliers)))
     return matches[kept], result, inliers[kept]
+
+
+class Climber:
+    """two_view, and after it the rungs of effort where it is not "ok"."""
+
+    def __init__(self, engine, pictures, views, tables):
+        self.engine, self.pictures, self.views, self.tables = engine, pictures, views, tables
+
+    def two_view(self, name0, name1):
+        """(matches (n, 2), TwoView, inliers (n,) bool, rung)."""
+        first = two_view(self.engine, self.views[name0], self.views[name1])
+        lowest, highest = self.engine.rungs
+        if highest == 0 or (lowest == 0 and first[1].verdict == tv.Verdict.OK):
+            return *first, 0
+        result, cloud = self.engine.climb([(*self.pictures.used(name), self.views[name].camera)
+                                           for name in (name0, name1)])
+        is_better = (result.verdict >= first[1].verdict
+                     and result.num_inliers > first[1].num_inliers)
+        if cloud.effort == 0 or (lowest == 0 and not is_better):
+            return *first, 0
+        return *self._in_database(name0, name1, result, cloud), cloud.effort
+
+    def _in_database(self, name0, name1, result, cloud):
+        """The inliers of a higher rung; its other matches are left out, so that no keypoint is
+        added for them."""
+        inliers = cloud.matches[cloud.inlier_mask]
+        columns = []
+        for v, name in enumerate((name0, name1)):
+            chosen = inliers[f"idx{v}"]
+            columns.append(self.tables[name].indices_of(
+                cloud.keypoints[v][chosen], cloud.tilts[v][chosen], cloud.descriptors[v][chosen]))
+        matches = np.column_stack(columns).astype(np.int64)
+        there = np.flatnonzero((matches >= 0).all(axis=1))
+        kept = one_to_one(matches, there[np.argsort(inliers["ratio"][there], kind="stable")])
+        return matches[kept].astype(np.uint32), result, np.ones(len(kept), bool)
 
 
 def export(job, feature=None, match=None, estimate=None):
     """Exports, and returns {what: how many}. On failure the database is as it was before."""
     schema = SCHEMAS[job.schema]
     engine = Engine(feature, match, estimate or
-                    tv.EstimateOptions(principal_point_sigma=PRINCIPAL_POINT_SIGMA_OF_A_DATABASE))
+                    tv.EstimateOptions(principal_point_sigma=PRINCIPAL_POINT_SIGMA_OF_A_DATABASE),
+                    rungs=EFFORTS[job.effort])
+    pictures = Pictures(job)
     with (appended_database if job.append else new_database)(job.database, schema) as writer:
         pairs = choose_pairs(job)
-        views = _describe_images(job, pairs, engine)
+        views = _describe_images(job, pairs, engine, pictures)
         pairs = [pair for pair in pairs if pair.name0 in views and pair.name1 in views]
         known = _Known(job)
-        ids = _write_images(writer, known, views)
+        ids, tables = _write_images(writer, known, views)
+        climber = Climber(engine, pictures, views, tables)
         counts = {"images": len(views), "new_images": len(set(views) - set(known.images)),
-                  "keypoints": sum(len(view.keypoints) for view in views.values()), "pairs": 0,
-                  "pairs_verified": 0, "inlier_matches": 0, "configurations": {}}
+                  "pairs": 0, "pairs_verified": 0, "inlier_matches": 0, "configurations": {},
+                  "efforts": {}}
         for pair in progress(pairs, "pair", job.quiet):
             id0, id1 = ids[pair.name0], ids[pair.name1]
             if tuple(sorted((id0, id1))) in known.pairs:
                 continue
-            matches, result, inliers = two_view(engine, views[pair.name0], views[pair.name1])
+            matches, result, inliers, rung = climber.two_view(pair.name0, pair.name1)
             row = conventions.geometry_to_colmap(result, matches[inliers])
             writer.add_pair(id0, id1, matches, row)
             name = result.kind.name.lower()
@@ -238,4 +357,7 @@ def export(job, feature=None, match=None, estimate=None):
             counts["pairs_verified"] += row.config != conventions.DEGENERATE
             counts["inlier_matches"] += len(row.inlier_matches)
             counts["configurations"][name] = counts["configurations"].get(name, 0) + 1
+            counts["efforts"][str(rung)] = counts["efforts"].get(str(rung), 0) + 1
+        _write_keypoints(writer, ids, tables)
+        counts["keypoints"] = sum(len(found.table) for found in tables.values())
     return counts

@@ -18,6 +18,8 @@ _EXPLICIT = {"max_keypoints": 2048, "method": tv.Solver.FIVE_POINT}
 SIGMAS_OF_THE_CAMERA = dict.fromkeys(("focal_sigma0", "focal_sigma1", "center_sigma0",
                                       "center_sigma1"))
 _FROM_CAMERA = "that of the camera"
+# --effort: the rung to begin with, and the highest one, of tv_reconstruct_options.
+EFFORTS = {"fixed": (0, 0), "auto": (0, 3), **{str(rung): (rung, rung) for rung in range(4)}}
 _NOT_HERE = ("gravity0", "gravity1", "gravity_sigma_rad", "reserved")
 
 
