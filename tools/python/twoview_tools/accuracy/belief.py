@@ -12,6 +12,9 @@ Each pair goes from the images to the pose by tv_reconstruct with its defaults, 
 the standard deviations that the program takes for a plain camera file: 0.01 of the focal length,
 0.005 focal lengths of the principal point. The verdict does not read these. The library's own
 default, an exact camera: --estimate focal_sigma0=0 focal_sigma1=0 center_sigma0=0 center_sigma1=0.
+--effort auto climbs as `twoview reconstruct` does while a pair is not "ok", to rung 3; the default
+is the library's, rung 0. One table more then has the "ok" and the covariance by the rung of the
+result.
 
 A pose is WRONG IN ROTATION when its rotation is off by more than 5 degrees plus the truth's stated
 error, and WRONG when that is so or its direction is off by more than 10 degrees plus the truth's
@@ -161,12 +164,13 @@ def enlarged(gray, zoom):
 class Views:
     """The pixels and cameras of images, each image read once."""
 
-    def __init__(self, sets, library, options):
+    def __init__(self, sets, library, options, max_effort=0):
         self.sets, self.library, self.options = sets, library, options
+        self.max_effort = max_effort
         cap = library.feature_options(options[0]).max_keypoints or 2048
         side = datasets.MAX_NATIVE_SIDE
         self.context = twoview_ctypes.Context(library, max_width=side, max_height=side,
-                                              max_keypoints=max(cap, 1))
+                                              max_keypoints=max(cap, 1), max_effort=max_effort)
         self.size_of_one = library.feature_options(options[0]).keypoint_size
         self.found = {}
 
@@ -231,14 +235,16 @@ def run_pair(views, job):
     sizes = gray0.shape[::-1], gray1.shape[::-1]
     lenses = [twoview_ctypes.make_camera(K, *size, distortion)
               for (K, distortion), size in zip((camera0, camera1), sizes)]
-    result, cloud = views.context.reconstruct(gray0, lenses[0], gray1, lenses[1], views.options)
+    result, cloud = views.context.reconstruct(gray0, lenses[0], gray1, lenses[1], views.options,
+                                              max_effort=views.max_effort)
     f0, f1 = zip(cloud.keypoints, cloud.descriptors)
     links, inliers = cloud.matches, cloud.inlier_mask
     matches = pipeline.make_matches(f0, f1, links, (camera0, camera1), sizes, views.size_of_one)
     R = np.array(result.R).reshape(3, 3) if result.has_R else None
     t = np.array(result.t) if result.has_R and result.has_t else None
     row = {"kind": kind, "set": name0, "image0": image0, "image1": image1, "zoom": zoom,
-           "num_keypoints": [len(f0[0]), len(f1[0])], **row_of_result(result)}
+           "num_keypoints": [len(f0[0]), len(f1[0])], "effort": cloud.effort,
+           "num_rungs": cloud.num_rungs, **row_of_result(result)}
     if kind == "unrelated":
         row["set1"] = name1
     keypoints = f0[0][links["idx0"]], f1[0][links["idx1"]]
@@ -263,10 +269,10 @@ def run_pair(views, job):
 
 def _run_piece(work):
     """The rows of a list of jobs; with a folder, their matches are written there as well."""
-    jobs, library, options, folder, number = work
+    jobs, library, options, folder, number, max_effort = work
     names = sorted({name for job in jobs for name in (job[1], job[3])})
     sets = {n: truth.PosedSet(os.path.join(datasets.data_dir(), n)) for n in names}
-    views = Views(sets, twoview_ctypes.Library(library), options)
+    views = Views(sets, twoview_ctypes.Library(library), options, max_effort)
     rows, kept = [], {}
     for i, job in enumerate(jobs):
         row, matches = run_pair(views, job)
@@ -280,13 +286,13 @@ def _run_piece(work):
 
 
 def run(names, num_pairs, num_others, seed=1, jobs=1, library=None, options=({}, {}, {}),
-        folder=None):
+        folder=None, max_effort=0):
     """The rows of the pairs of the sets, as the module describes them."""
     sets = {n: truth.PosedSet(os.path.join(datasets.data_dir(), n)) for n in names}
     pieces = pieces_of(plan(sets, num_pairs, num_others, seed))
     rows, done, report = [], 0, tables.progress("belief", log=True)
     total = sum(map(len, pieces))
-    work = [(piece, library, options, folder, i) for i, piece in enumerate(pieces)]
+    work = [(piece, library, options, folder, i, max_effort) for i, piece in enumerate(pieces)]
     for part in parallel.run(_run_piece, work, jobs):
         rows += part
         done += len(part)
@@ -331,6 +337,8 @@ def main(argv=None):
                              "pose is wrong, for example 0.005")
     parser.add_argument("--check-rotation", type=float, metavar="SHARE",
                         help="the same for those wrong in rotation")
+    parser.add_argument("--effort", choices=("fixed", "auto"), default="fixed",
+                        help="auto: climb to rung 3 while the verdict is not ok (default: fixed)")
     parser.add_argument("--lib", help="libtwoview.so (default: build/release/lib)")
     for stage in ("feature", "match", "estimate"):
         parser.add_argument("--" + stage, nargs="+", default=[], metavar="KEY=VALUE",
@@ -354,7 +362,8 @@ def main(argv=None):
         if arguments.matches:
             os.makedirs(arguments.matches, exist_ok=True)
         rows = run(names, arguments.pairs, arguments.others, arguments.seed, arguments.jobs,
-                   arguments.lib, options, arguments.matches)
+                   arguments.lib, options, arguments.matches,
+                   twoview_ctypes.MAX_EFFORT if arguments.effort == "auto" else 0)
     if arguments.rows:
         with open(arguments.rows, "w", encoding="utf-8") as file:
             for row in rows:

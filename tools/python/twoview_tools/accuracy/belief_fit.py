@@ -5,9 +5,10 @@ The event is: the rotation of a full pose is off by more than 5 degrees plus the
 error. A logistic model, whose coefficients must have the sign that their evidence has (more
 agreement never raises the probability); where the fit asks for the other sign, that part is left
 out. No set weighs more than MOST_WEIGHT pairs, so that the large sequences do not decide alone;
-sets of the same place are left out together. A set that is run with a wrong lens as well
-("file-lens") is two sets of one place in the fit: users have wrong lenses, too. It is judged with
-the better lens alone."""
+sets of the same place are left out together. Of rows that climbed the rungs of effort, each rung
+that was run is a trial, and multiplies the odds of the model as in belief.cc. A set that is run
+with a wrong lens as well ("file-lens") is two sets of one place in the fit: users have wrong
+lenses, too. It is judged with the better lens alone."""
 
 import numpy as np
 
@@ -43,9 +44,15 @@ def place_of(name):
     return next((min(group) for group in truth.SAME_PLACE if name in group), name)
 
 
-def fit(X, y, weights):
+def offsets_of(rows):
+    """What the trials of each row add to the logit."""
+    return np.log([max(1, r.get("num_rungs", 1)) for r in rows])
+
+
+def fit(X, y, weights, offsets=0.0):
     """[bias, coefficients] of the logistic model: Newton's method on the weighted log-loss with a
-    ridge. Parts that the fit would give the wrong sign get the coefficient 0."""
+    ridge. Parts that the fit would give the wrong sign get the coefficient 0. offsets: added to the
+    logits, and not fitted."""
     signs = np.array([0, *PARTS.values()])
     middle, spread = X.mean(axis=0), X.std(axis=0) + 1e-9
     Z = np.column_stack([np.ones(len(X)), (X - middle) / spread])
@@ -54,7 +61,7 @@ def fit(X, y, weights):
         A, b = Z[:, active], np.zeros(active.sum())
         ridge = np.diag(np.where(np.flatnonzero(active) == 0, 1e-6, RIDGE))
         for _ in range(30):
-            p = 1 / (1 + np.exp(-A @ b))
+            p = 1 / (1 + np.exp(-(A @ b + offsets)))
             step = np.linalg.solve((A * (weights * p * (1 - p))[:, None]).T @ A + ridge,
                                    A.T @ (weights * (p - y)) + ridge @ b)
             b -= step
@@ -91,8 +98,8 @@ def weights_of(sets):
     return np.array([share[s] for s in sets])
 
 
-def probabilities(X, coefficients):
-    return 1 / (1 + np.exp(-(coefficients[0] + X @ coefficients[1:])))
+def probabilities(X, coefficients, offsets=0.0):
+    return 1 / (1 + np.exp(-(coefficients[0] + X @ coefficients[1:] + offsets)))
 
 
 def left_out(rows):
@@ -101,12 +108,14 @@ def left_out(rows):
     y = np.array([bool(r["wrong_rotation"]) for r in rows], float)
     sets = np.array([name_of(r) for r in rows])
     places = np.array([place_of(r["set"]) for r in rows])
+    offsets = offsets_of(rows)
     found = np.zeros(len(rows))
     if len(np.unique(places)) < 2:
         raise ValueError("at least two places are needed")
     for place in np.unique(places):
         train, test = places != place, places == place
-        found[test] = probabilities(X[test], fit(X[train], y[train], weights_of(sets[train])))
+        model = fit(X[train], y[train], weights_of(sets[train]), offsets[train])
+        found[test] = probabilities(X[test], model, offsets[test])
     return found
 
 
@@ -125,7 +134,7 @@ def constants(rows):
     rows = fitted_rows(rows)
     X = np.array([parts_of(r) for r in rows])
     y = np.array([bool(r["wrong_rotation"]) for r in rows], float)
-    bias, *weights = fit(X, y, weights_of(np.array([name_of(r) for r in rows])))
+    bias, *weights = fit(X, y, weights_of(np.array([name_of(r) for r in rows])), offsets_of(rows))
     usual = np.median(X[[bool(r["right"]) and r["kind"] == "related" for r in rows]], axis=0)
     lines = [f"bias {bias:.3f}"]
     return lines + [f"{name} {weight:.3f}, usual {value:.3f}"
@@ -137,6 +146,9 @@ def left_out_tables(rows):
     fitted, rows = fitted_rows(rows), usable(rows)
     p = left_out(fitted)[:len(rows)]
     groups = belief_tables.by_set(rows)
+    rungs = belief_tables.by_rung(rows)
+    if len(rungs) > 1:
+        groups.update({f"rung {rung}": some for rung, some in rungs.items()})
     of_row = {id(r): q for r, q in zip(rows, p)}
     by_set = []
     for name, some in groups.items():

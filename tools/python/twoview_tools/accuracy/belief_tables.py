@@ -136,6 +136,12 @@ def check(rows, key, limit):
                             f"({100 * share:.2f} per cent, at most {100 * limit:g})")
 
 
+def by_rung(rows):
+    """{rung: its rows}, ascending; rows of before there were rungs are of rung 0."""
+    rungs = sorted({r.get("effort", 0) for r in rows})
+    return {rung: [r for r in rows if r.get("effort", 0) == rung] for rung in rungs}
+
+
 # ---- text ----------------------------------------------------------------------------------------
 
 def _cell(value):
@@ -229,6 +235,27 @@ def _reliability(style, rows):
         [[name] + _reliability_line(some) for name, some in by_set(good).items()])
 
 
+def _rungs(style, rows):
+    """The "ok" by the rung of effort of the result; empty where no pair was above rung 0."""
+    groups = by_rung(rows)
+    if set(groups) <= {0}:
+        return ""
+    lines = []
+    for rung, some in [*groups.items(), ("all", rows)]:
+        s, r = summary(some), reliability(ok(some))
+        stated = sum(row["probability_wrong"] for row in ok(some))
+        lines.append([str(rung), s["pairs"], s["ok"], s["wrong_rotation"], float(stated),
+                      s["wrong"], s["right"], s["right_ok"],
+                      _percent(s["right_ok"], s["right"]),
+                      _percent(r["inside"] * r["pairs"], r["pairs"]),
+                      _percent(r["inside_with_truth"] * r["pairs"], r["pairs"])])
+    return style.table(
+        "By the rung of effort of the result. \"stated\": the sum of probability_wrong over the "
+        "\"ok\", beside the number that are wrong in rotation. The last two columns are of the "
+        "\"ok\"", ["rung", "pairs", "ok", "wrong in rotation", "stated", "wrong", "right",
+                   "of these ok", "%", "% inside", "+ truth"], lines)
+
+
 def _curve(style, rows, part):
     good = [r for r in ok(rows) if r.get("chi2_freedom")
             and (part == "rotation" or r["direction_counts"])]
@@ -287,7 +314,7 @@ def text(rows):
             _errors(_Text, "Verdict against the direction's error [deg], where it counts", aimed,
                     "direction_error_deg"),
             _sets(_Text, good), _calibration(_Text, good), _reasons(_Text, good),
-            _features(_Text, good),
+            _features(_Text, good), _rungs(_Text, good),
             _reliability(_Text, good), _curve(_Text, good, "rotation"),
             _curve(_Text, good, "direction")]
     apart = sum(r["kind"] == "related" and not r["trusted"] for r in rows)
@@ -340,7 +367,7 @@ def _overview(rows):
 def markdown(rows):
     """The tables of docs/accuracy.md."""
     good = related(rows)
-    return "\n".join([_overview(good), _calibration(_Markdown, good),
+    return "\n".join([_overview(good), _rungs(_Markdown, good), _calibration(_Markdown, good),
                       _errors(_Markdown, "Verdict against the rotation's error [deg]", good,
                               "rotation_error_deg"),
                       _features(_Markdown, good, FEATURES[:1]), _reasons(_Markdown, good),

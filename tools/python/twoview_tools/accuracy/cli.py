@@ -16,7 +16,7 @@ import tempfile
 
 import numpy as np
 
-from . import (datasets, estimators, grid, homography, identical, metrics, peers, pipeline,
+from . import (datasets, effort, estimators, grid, homography, identical, metrics, peers, pipeline,
                robust500, targets, verdicts)
 from .tables import (MIN_PAIRS, OURS, machine, mean_summary, print_means, print_table, progress,
                     runs_of, say, summarise)
@@ -183,7 +183,9 @@ def main():
     # Commands of their own, each with its own --help.
     if "--grid" in own:
         return grid.main(own)
-    for flag, command in (("--homography", homography.main), ("--verdicts", verdicts.main)):
+    # --verdicts has an option --effort of its own.
+    for flag, command in (("--homography", homography.main), ("--verdicts", verdicts.main),
+                          ("--effort", effort.main)):
         if flag in own:
             return command([word for word in own if word != flag])
     if "--" in own:
@@ -193,7 +195,7 @@ def main():
         epilog="Options after -- go to `twoview evaluate`, with --report to compare_colmap. "
                "Commands of their own, each with --help: --grid FILE (options chosen by leaving "
                "one set out), --homography (matches of planar pairs), --verdicts (unrelated "
-               "pictures, and the verdict against the error).")
+               "pictures, and the verdict against the error), --effort (the rungs of effort).")
     parser.add_argument("--json", metavar="F", help="write everything, every pair included")
     parser.add_argument("--sets", help="names, separated by commas (default: all with pairs)")
     parser.add_argument("--groups", help="only the sets of the group narrow, or wide")

@@ -9,6 +9,9 @@ taken in turn from all pairs of sets, without repetition, in an order drawn with
 most 3 in 10^4 may be "ok". Related: every pair with a true pose, the flagged ones of the accuracy
 tables included; at most 1 in 100 of the "ok" may be wrong by more than 10 degrees (the larger of
 the rotation's and the direction's angle, the direction with its sign).
+
+--effort auto climbs to rung 3 while a pair is not "ok", as `twoview reconstruct` does; the table of
+unrelated pairs then says how many ended on each rung.
 """
 
 import os
@@ -66,12 +69,20 @@ def images_of(data):
 
 # ---- evaluation ----------------------------------------------------------------------------------
 
+def row_of(pair, result, num_matches, num_inliers):
+    return {"image0": "/".join(pair[0]), "image1": "/".join(pair[1]),
+            "verdict": twoview_ctypes.enum_name("verdict", result.verdict),
+            "kind": twoview_ctypes.enum_name("kind", result.kind),
+            "reasons": int(result.reasons), "num_matches": num_matches,
+            "num_inliers": num_inliers, "effort": 0}
+
+
 class Pictures:
     """The features and cameras of images of several sets, each image extracted once."""
 
-    def __init__(self, folders, library_path, options, flagged):
+    def __init__(self, folders, library_path, options, flagged, max_effort=0):
         self.library = twoview_ctypes.Library(library_path)
-        self.options = options
+        self.options, self.max_effort = options, max_effort
         self.sets = {os.path.basename(folder): datasets.Set(folder, flagged=flagged)
                      for folder in folders}
         self.pairs = {name: {n: (pair, side) for pair in data.pairs[::-1]
@@ -81,7 +92,7 @@ class Pictures:
         cap = self.library.feature_options(options[0]).max_keypoints or 2048
         self.context = twoview_ctypes.Context(
             self.library, max_width=max(s[0] for s in sizes), max_height=max(s[1] for s in sizes),
-            max_keypoints=max(cap, 1))
+            max_keypoints=max(cap, 1), max_effort=max_effort)
         self.features = {}
 
     def view(self, name, image):
@@ -93,10 +104,27 @@ class Pictures:
         return (self.features[name, image], data.gray(image)[0],
                 data.camera(*self.pairs[name][image]))
 
+    def climb(self, pair):
+        """The same as `run`, by tv_reconstruct alone, with effort."""
+        lenses, grays = [], []
+        for name, image in pair:
+            data = self.sets[name]
+            grays.append(data.gray(image)[0])
+            K, distortion = data.camera(*self.pairs[name][image])
+            lenses.append(twoview_ctypes.make_camera(K, *grays[-1].shape[::-1], distortion))
+        result, cloud = self.context.reconstruct(grays[0], lenses[0], grays[1], lenses[1],
+                                                 self.options, max_effort=self.max_effort)
+        R = np.reshape(result.R, (3, 3)) if result.has_R else None
+        t = np.array(result.t) if result.has_R and result.has_t else None
+        return R, t, {**row_of(pair, result, len(cloud.matches), int(cloud.inlier_mask.sum())),
+                      "effort": cloud.effort}
+
     def run(self, pair):
         """(R or None, t or None, row) of two (set, image). The pose is that of tv_reconstruct, and
         so is the verdict: tv_reconstruct itself runs where the stages do not refuse, because it
         has reasons for doubt that tv_estimate_two_view does not have."""
+        if self.max_effort:
+            return self.climb(pair)
         features, grays, cameras = zip(*(self.view(*image) for image in pair))
         sizes = [gray.shape[::-1] for gray in grays]
         size_of_one = self.library.feature_options(self.options[0]).keypoint_size
@@ -110,17 +138,12 @@ class Pictures:
                       for (K, distortion), size in zip(cameras, sizes)]
             result, _ = self.context.reconstruct(grays[0], lenses[0], grays[1], lenses[1],
                                                  self.options)
-        return R, t, {"image0": "/".join(pair[0]), "image1": "/".join(pair[1]),
-                      "verdict": twoview_ctypes.enum_name("verdict", result.verdict),
-                      "kind": twoview_ctypes.enum_name("kind", result.kind),
-                      "reasons": int(result.reasons), "num_matches": len(matches),
-                      "num_inliers": inliers}
+        return R, t, row_of(pair, result, len(matches), inliers)
 
 
 @functools.lru_cache(maxsize=1)
 def _pictures(text):
-    folders, library_path, options, flagged = json.loads(text)
-    return Pictures(folders, library_path, options, flagged)
+    return Pictures(*json.loads(text))
 
 
 def _run_unrelated(job):
@@ -186,6 +209,10 @@ def summarise_related(rows):
 def print_unrelated(rows, counts):
     tables.say(f"\n{len(rows)} pairs of unrelated pictures: "
                + ", ".join(f"{n} {v}" for v, n in counts.items()))
+    rungs = sorted({row["effort"] for row in rows})
+    if rungs[-1:] > [0]:
+        ended = (f"{sum(row['effort'] == rung for row in rows)} on rung {rung}" for rung in rungs)
+        tables.say("  ended: " + ", ".join(ended))
     for row in rows:
         if row["verdict"] == "ok":
             tables.say(f"  ok: {row['image0']} {row['image1']}, {row['kind']}, "
@@ -221,6 +248,8 @@ def main(argv=None):
     for stage in ("feature", "match", "estimate"):
         parser.add_argument("--" + stage, nargs="+", default=[], metavar="KEY=VALUE")
     parser.add_argument("--sets", help="names, separated by commas (default: all)")
+    parser.add_argument("--effort", choices=("fixed", "auto"), default="fixed",
+                        help="auto: climb to rung 3 while the verdict is not ok (default: fixed)")
     parser.add_argument("--lib", help="libtwoview.so (default: build/release/lib)")
     parser.add_argument("--jobs", type=int, default=1, help="processes (default 1)")
     parser.add_argument("--json", metavar="F", help="write every pair")
@@ -234,8 +263,9 @@ def main(argv=None):
     except ValueError as error:
         sys.exit(f"accuracy.verdicts: {error}")
     folders = [os.path.join(datasets.data_dir(), name) for name in names]
-    text = json.dumps([folders, arguments.lib, options, True])
-    lines, result = [], {"options": options}
+    max_effort = twoview_ctypes.MAX_EFFORT if arguments.effort == "auto" else 0
+    text = json.dumps([folders, arguments.lib, options, True, max_effort])
+    lines, result = [], {"options": options, "effort": arguments.effort}
     if arguments.pairs:
         images = {os.path.basename(f): images_of(datasets.Set(f, flagged=True)) for f in folders}
         pairs = choose_unrelated(images, arguments.pairs)
