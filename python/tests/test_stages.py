@@ -348,3 +348,22 @@ def test_matches_beyond_the_limit_are_left_out(image):
     assert whole.num_matches_left_out == 0
     assert len(part.matches) == 20
     assert part.num_matches_left_out == len(whole.matches) - 20
+
+
+def test_a_context_with_effort_climbs_unless_told_not_to():
+    """The second image is the first one with its columns averaged by four: a wall at 76 degrees."""
+    rng = np.random.default_rng(3)
+    patches = rng.integers(20, 236, (50, 120)).astype(np.uint8)
+    wide = np.kron(patches, np.ones((4, 4), np.uint8))
+    slim = np.ascontiguousarray(wide.reshape(200, 120, 4).mean(axis=2).astype(np.uint8))
+    slim = np.ascontiguousarray(slim.reshape(200, 60, 2).mean(axis=2).astype(np.uint8))
+    limits = {"max_width": 480, "max_height": 200, "max_keypoints": 500}
+    with tv.Context(max_effort=3, **limits) as context:
+        assert context.max_effort == 3
+        climbed = tv.reconstruct(context, wide, None, slim, None)[1]
+        held = tv.reconstruct(context, wide, None, slim, None, max_effort=0)[1]
+        alone = tv.reconstruct(context, wide, None, slim, None, effort=2)[1]
+    assert climbed.effort >= 2 and climbed.num_rungs >= 2
+    assert (held.effort, held.num_rungs, alone.effort, alone.num_rungs) == (0, 1, 2, 1)
+    with tv.Context(**limits) as context:
+        assert tv.reconstruct(context, wide, None, slim, None)[1].effort == 0

@@ -17,7 +17,7 @@ class Context:
 
     max_width, max_height: the largest image, pixels. max_keypoints: the most descriptors of an
     image. max_matches: the most matches of an estimate; 0 means max_keypoints. kernels: a Kernels.
-    max_effort: the highest rung of effort of reconstruct, 0 to 3. purposes: bits of Purpose for the
+    max_effort: the highest rung of effort, 0 to 3, to which reconstruct climbs. purposes: bits of Purpose for the
     calls that get memory, 0 for all; another call raises TV_ERR_LIMITS. library: a Library in place
     of the package's own. Calls from several threads wait for each other; use one context for each
     thread to run them at once. close() or a with statement frees the memory; later calls raise
@@ -43,6 +43,7 @@ class Context:
         self.lock = threading.RLock()
         self.size_bytes = size.value
         self.max_keypoints = int(limits.max_keypoints)
+        self.max_effort = int(limits.max_effort)
 
     def __enter__(self) -> Context:
         return self

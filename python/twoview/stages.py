@@ -615,7 +615,7 @@ def reconstruct(context: Context, image0: np.ndarray, camera0: Optional[Camera],
                 triangulation: int = Triangulation.ITERATIVE_LS, guided_matching: bool = False,
                 bundle_adjustment: bool = False,
                 sigma_by_size: float = 1.0, align_matches: bool = True, effort: int = 0,
-                max_effort: int = 0) -> tuple[TwoView, Reconstruction]:
+                max_effort: Optional[int] = None) -> tuple[TwoView, Reconstruction]:
     """tv_reconstruct: from two images to a pose and points.
 
     context: as large as both images. image0, image1: (height, width) uint8, read without a copy.
@@ -627,12 +627,15 @@ def reconstruct(context: Context, image0: np.ndarray, camera0: Optional[Camera],
     adjusted together. sigma_by_size: the exponent of keypoint_sigmas, [0, 2]. align_matches:
     whether one keypoint of each match is moved by the pixels around both. effort: the rung of
     effort to begin with, 0 to the context's max_effort; max_effort: the highest rung, which is
-    climbed to while the verdict is not OK and the evidence says that more could help.
+    climbed to while the verdict is not OK and the evidence says that more could help. None: with
+    effort 0 that of the context, else the rung `effort` alone.
     Returns a TwoView and a Reconstruction. "No geometry" is a result, not an exception: see
     TwoView.verdict.
     Raises TypeError or ValueError for an array that C could not read and for one camera alone,
     TV_ERR_CAMERA for an image that is not of its camera's size, TV_ERR_LIMITS for an image above
     the context's limits, TV_ERR_ARGUMENT for an option out of its range."""
+    if max_effort is None:
+        max_effort = check_context(context).max_effort if effort == 0 else effort
     found, cloud = _reconstruct(
         context, image0, camera0, image1, camera1, (mask0, mask1), (feature, match, estimate),
         triangulation=triangulation, guided_matching=guided_matching,
