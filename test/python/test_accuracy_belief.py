@@ -376,6 +376,14 @@ class TestFit(unittest.TestCase):
         found = belief_fit.fit(*self.arrays(self.drawn(true, 20000)))
         np.testing.assert_allclose(found[1:], true[1:], atol=0.2)
 
+    def test_each_rung_that_was_run_multiplies_the_odds(self):
+        row = dict(self.drawn(np.array([6.0, 1.2, 3.0, -2.5, 0.5, 1.3]), 1)[0], num_rungs=3)
+        X, model = np.array([belief_fit.parts_of(row)]), np.array([0.5, 1, 1, -1, 0.5, 1])
+        once, thrice = (belief_fit.probabilities(X, model, offset)[0]
+                        for offset in (0.0, belief_fit.offsets_of([row])))
+        self.assertAlmostEqual(thrice / (1 - thrice), 3 * once / (1 - once))
+        self.assertEqual(belief_fit.offsets_of([{}, {"num_rungs": 1}]).tolist(), [0, 0])
+
     def test_a_part_of_the_wrong_sign_is_left_out(self):
         found = belief_fit.fit(*self.arrays(self.drawn(np.array([2, 1.2, -3, -1, 0.5, 0]), 5000)))
         self.assertEqual(found[2], 0)
