@@ -1,6 +1,7 @@
 """scripts/room: rooms made from rendered flights, beside their exact surfaces."""
 
 import argparse
+import json
 import os
 import statistics
 import subprocess
@@ -11,7 +12,7 @@ import numpy as np
 
 from .. import ROOT
 from ..odometry import flights, poses, sets, surfaces
-from . import flight, model, truth
+from . import flight, model, peer, tape, truth
 
 FLIGHT_FOLDER = os.path.join(ROOT, ".cache", "flights")
 PROGRAM = os.path.join(ROOT, "build", "release", "bin", "twoview")
@@ -28,29 +29,73 @@ def arguments_of(argv):
     parser.add_argument("--voxel", type=float, default=0.03, metavar="METRES")
     parser.add_argument("--measured-only", action="store_true",
                         help="carry no planes across areas without texture")
+    parser.add_argument("--peers", action="store_true",
+                        help="the same with the depth maps of PatchMatch stereo (ppg_core) as well,"
+                        " of the same keyframes, partners and poses; some 10 s a keyframe")
+    parser.add_argument("--tape", action="store_true",
+                        help="lengths between marks on the surface as well, beside the true ones")
     return parser.parse_args(argv)
 
 
 def measure(folder, out, arguments):
-    """The scores of one flight's room, and its times."""
+    """The scores of one flight's room, and its times; under "peer" those of the peer's maps."""
     source = flight.read_flight(folder, out, arguments.true_poses)
-    made = model.make(source, model.Settings(voxel=arguments.voxel,
-                                             measured_only=arguments.measured_only))
+    settings = model.Settings(voxel=arguments.voxel, measured_only=arguments.measured_only)
+    made = model.make(source, settings)
     boxes = surfaces.read_boxes(os.path.join(folder, "surfaces.json"))
     scale, R, t = 1.0, np.eye(3), np.zeros(3)
     if not arguments.true_poses:
         found = flight.longest(poses.read_tum(os.path.join(out, "trajectory.txt")))
         scale, R, t = flight.world_from_map(found, sets.read_set(folder).truth())
-    positions = scale * made.vertices["position"].astype(float) @ R.T + t
     keys = source.keyframes  # all of them: what they could see is to be there
     samples = truth.sample_boxes(boxes, 0.03)
     seen = truth.seen_twice(boxes, samples, source.camera, R @ source.R[keys],
                             scale * source.centres[keys] @ R.T + t)
-    row = truth.scores(boxes, samples[seen], positions, made.vertices["inferred"] > 0,
-                       made.triangles, WITHIN)
-    return {**row, "keyframes": len(made.keyframes), "voxel": made.voxel,
-            "vertices": len(positions),
-            "ms_depth": made.ms_depth, "ms_fusion": made.ms_fusion, "ms_mesh": made.ms_mesh}
+
+    def row_of(one):
+        positions = scale * one.vertices["position"].astype(float) @ R.T + t
+        row = truth.scores(boxes, samples[seen], positions, one.vertices["inferred"] > 0,
+                           one.triangles, WITHIN)
+        return {**row, "keyframes": len(one.keyframes), "voxel": one.voxel,
+                "vertices": len(positions),
+                "ms_depth": one.ms_depth, "ms_fusion": one.ms_fusion, "ms_mesh": one.ms_mesh}
+
+    row = row_of(made)
+    if arguments.tape:
+        row["tape"] = taped(folder, out, arguments, source, made, boxes, samples[seen], scale)
+    if arguments.peers:
+        row["peer"] = row_of(model.make(source, settings, peer.depth_like(made)))
+    return row
+
+
+def taped(folder, out, arguments, source, made, boxes, points, scale):
+    """The tape measure's scores of a room that was made."""
+    true = flight.read_flight(folder, out, true_poses=True)
+    at = {name: k for k, name in enumerate(true.names)}
+    keys = [k for k in source.keyframes if source.names[k] in at]
+    true_keys = [at[source.names[k]] for k in keys]
+    picks = tape.picks_of(tape.Surface(made.vertices, made.triangles), boxes, points,
+                          source.camera,
+                          (true.R[true_keys], true.centres[true_keys]),
+                          (source.R[keys], source.centres[keys]))
+    scale_sigma = 0.0
+    if not arguments.true_poses:
+        with open(os.path.join(out, "result.json"), encoding="utf-8") as file:
+            result = json.load(file)
+        if result["scale"] != "metric":
+            return {"lengths": 0}
+        scale_sigma = result["scale_sigma"]
+    return tape.scores(picks, made.voxel, scale_sigma, scale)
+
+
+def tape_line_of(label, found):
+    if not found["lengths"]:
+        return f"{label:10} no lengths: the path's unit is not the metre, or nothing was picked"
+    percent = lambda name: f"{100 * found[name]:.1f} %"
+    return (f"{label:10} {found['lengths']} lengths: {percent('within_2_sigma')} within 2 sigma, "
+            f"{percent('within_1_percent')} within 1 % ({percent('within_1_percent_of_scaled')} "
+            f"with the true metre), off by {100 * found['off_median']:.2f} % in the median; metre "
+            f"off by {percent('metre_off')} (sigma {percent('metre_sigma')})")
 
 
 def line_of(label, row):
@@ -77,6 +122,10 @@ def main(argv=None):
             row = measure(folder, out, arguments)
         rows.append(row)
         print(line_of(f"{seed:02d}", row), flush=True)
+        if arguments.peers:
+            print(line_of("  peer", row["peer"]), flush=True)
+        if arguments.tape:
+            print(tape_line_of(f"   tape {seed:02d}", row["tape"]), flush=True)
     if rows:
         print(f"mean F {statistics.mean(row['f'] for row in rows):.3f}, "
               f"worst {min(row['f'] for row in rows):.3f}")

@@ -81,8 +81,8 @@ def depth_of(flight, index, pictures):
                           far_depth=found[2])
 
 
-def make(flight, settings=Settings()):
-    """The Model of a Flight."""
+def make(flight, settings=Settings(), depth_of=depth_of):
+    """The Model of a Flight; depth_of: what makes the maps, a peer perhaps."""
     def pictures(i):
         return cv2.imread(f"{flight.folder}/{flight.names[i]}", cv2.IMREAD_GRAYSCALE)
 

@@ -30,24 +30,40 @@ def sample_boxes(boxes, spacing=SPACING):
     return np.concatenate(found)
 
 
+def crossings(box, eye, rays):
+    """Where each ray enters and leaves a box, in lengths of the ray: slabs method. It misses the
+    box where it enters after it leaves."""
+    c, s = np.cos(box["yaw_rad"]), np.sin(box["yaw_rad"])
+    box_from_world = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+    start = box_from_world @ (eye - np.asarray(box["centre"]))
+    ray = rays @ box_from_world.T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        low = (-np.asarray(box["half"]) - start) / ray
+        high = (np.asarray(box["half"]) - start) / ray
+    return np.nanmax(np.minimum(low, high), 1), np.nanmin(np.maximum(low, high), 1)
+
+
 def is_blocked(boxes, eye, points):
-    """Whether something stands between the eye and each point: a solid box, slabs method."""
+    """Whether something stands between the eye and each point: a solid box."""
     blocked = np.zeros(len(points), bool)
     for box in boxes:
         if box["is_room"]:
             continue
-        c, s = np.cos(box["yaw_rad"]), np.sin(box["yaw_rad"])
-        box_from_world = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
-        start = box_from_world @ (eye - np.asarray(box["centre"]))
-        ray = (points - eye) @ box_from_world.T
-        with np.errstate(divide="ignore", invalid="ignore"):
-            low = (-np.asarray(box["half"]) - start) / ray
-            high = (np.asarray(box["half"]) - start) / ray
-        enter = np.nanmax(np.minimum(low, high), 1)
-        leave = np.nanmin(np.maximum(low, high), 1)
+        enter, leave = crossings(box, eye, points - eye)
         end = 1 - MARGIN / np.linalg.norm(points - eye, axis=1)
         blocked |= (enter < leave) & (enter < end) & (leave > 0)
     return blocked
+
+
+def first_distances(boxes, eye, rays):
+    """How far each ray goes before it meets a surface: a box, or the room's walls from inside; in
+    lengths of the ray."""
+    nearest = np.full(len(rays), np.inf)
+    for box in boxes:
+        enter, leave = crossings(box, eye, rays)
+        hit = leave if box["is_room"] else enter
+        nearest = np.where((enter < leave) & (hit > 0), np.minimum(nearest, hit), nearest)
+    return nearest
 
 
 def seen_twice(boxes, points, camera, rotations, centres):
