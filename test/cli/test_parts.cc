@@ -2,7 +2,11 @@
 // used only inside functions that return plain values, since Unity leaves a failing test by
 // longjmp, which skips destructors.
 
+#include <unistd.h>
+
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <limits>
 
@@ -14,6 +18,7 @@
 #include "files/matches_file.h"
 #include "files/pairs_file.h"
 #include "odometry/outputs.h"
+#include "odometry/truth_fit.h"
 #include "pair/camera_advice.h"
 #include "pair/measures.h"
 #include "pair/options.h"
@@ -691,11 +696,114 @@ void test_a_clock_that_falls_and_rises_again_began_anew() {
   TEST_ASSERT_TRUE(clock_gives({5, 6, 0, 2, 4, 1, 2, 9}, {5, 6, -1, 7, 9, -1, 10, 17}, 2));
 }
 
+// A flight of 60 frames at 15 a second that turns about all three axes.
+Trajectory turning_flight() {
+  Trajectory flight;
+  for (int i = 0; i < 60; ++i) {
+    const double a = 0.02 * i, b = 0.5 * std::sin(0.1 * i), c = 0.3 * std::cos(0.17 * i);
+    const Matrix3 R = product(rotation_of_quaternion(std::sin(a), 0, 0, std::cos(a)),
+                              product(rotation_of_quaternion(0, std::sin(b), 0, std::cos(b)),
+                                      rotation_of_quaternion(0, 0, std::sin(c), std::cos(c))));
+    flight.push_back({i / 15.0, {R, {0.1 * i, std::sin(0.1 * i), 0}}});
+  }
+  return flight;
+}
+
+// The flight as a file of a truth, and the words on its rotations.
+std::string words_on_written(const char* head, bool is_scalar_first, const char* between,
+                             const Matrix3& camera_from_body) {
+  char name[] = "/tmp/twoview_truth_XXXXXX";
+  const int file = mkstemp(name);
+  std::string text = head;
+  for (const TimedPose& at : turning_flight()) {
+    const auto [x, y, z, w] = quaternion_of(product(at.pose.R, camera_from_body));
+    char line[300];
+    const double q[5] = {w, x, y, z, w};
+    const double* const first = q + (is_scalar_first ? 0 : 1);
+    std::snprintf(line, sizeof line, "%.6f%s%f%s%f%s0%s%.9f%s%.9f%s%.9f%s%.9f\n", at.time_s,
+                  between, at.pose.t[0], between, at.pose.t[1], between, between, first[0], between,
+                  first[1], between, first[2], between, first[3]);
+    text += line;
+  }
+  const bool is_written =
+      write(file, text.data(), text.size()) == static_cast<ssize_t>(text.size());
+  close(file);
+  const std::string words =
+      is_written ? rotation_words(turning_flight(), load_trajectory(name, {}, {})) : "not written";
+  unlink(name);
+  return words;
+}
+
+void test_a_truth_with_the_other_order_of_its_quaternions_is_told_from_the_right_one() {
+  const Matrix3 same{1, 0, 0, 0, 1, 0, 0, 0, 1}, body{0, -1, 0, 0, 0, -1, 1, 0, 0};
+  const char* const names = "# timestamp tx ty tz qw qx qy qz\n";
+  TEST_ASSERT_TRUE(words_on_written("", false, " ", same).empty());
+  TEST_ASSERT_TRUE(words_on_written("# made by hand\n", false, " ", same).empty());
+  TEST_ASSERT_TRUE(holds(words_on_written("", true, " ", same), "as qw qx qy qz they fit"));
+  TEST_ASSERT_TRUE(words_on_written(names, true, " ", same).empty());
+  TEST_ASSERT_TRUE(
+      words_on_written("#time [s], x [m], y [m], z [m], qw, qx, qy, qz\n", true, ",", same)
+          .empty());
+  // EuRoC's order is the other one where a line has more columns than eight: here it has not.
+  TEST_ASSERT_TRUE(holds(words_on_written("", true, ",", same), "as qw qx qy qz they fit"));
+  // With names the order is known, so that only another body is left.
+  TEST_ASSERT_TRUE(holds(words_on_written(names, false, " ", same), "of another body"));
+  TEST_ASSERT_TRUE(holds(words_on_written("", false, " ", body), "of another body"));
+}
+
+FrameClock clock_of_60(const char* pattern) {
+  FrameClock clock;
+  for (int i = 0; i < 60; ++i) {
+    char name[32];
+    std::snprintf(name, sizeof name, pattern, 100 + 2 * i);
+    clock.numbers.push_back(i);
+    clock.times_s.push_back(i / 15.0);
+    clock.names.emplace_back(name);
+  }
+  return clock;
+}
+
+// What is said of a truth whose times are first, first + step, ..., and how many then meet.
+std::string words_on_numbers(double first, double step, const char* pattern, int* num_met) {
+  TruePoses truth;
+  truth.poses = turning_flight();
+  for (size_t i = 0; i < 60; ++i) truth.poses[i].time_s = first + step * static_cast<double>(i);
+  const std::string words = fit_times(turning_flight(), truth, clock_of_60(pattern));
+  *num_met = static_cast<int>(associated(turning_flight(), truth.poses).size());
+  return words;
+}
+
+void test_times_that_are_frame_numbers_are_understood_and_said() {
+  const struct {
+    double first, step;
+    const char *pattern, *words;
+    int met;
+  } cases[] = {{0, 1, "frame", "counted from 0", 60},
+               {1, 1, "frame", "counted from 1", 60},
+               {1, 1, "%d.png", "counted from 1", 60},
+               {100, 2, "%d.png", "the numbers in the pictures' names", 60},
+               {0, 1 / 15.0, "%d.png", nullptr, 60},
+               {0, 1.3 / 15, "%d.png", "are the times of one clock?", 10}};
+  for (const auto& c : cases) {
+    int met = 0;
+    const std::string words = words_on_numbers(c.first, c.step, c.pattern, &met);
+    TEST_ASSERT_TRUE_MESSAGE(c.words ? holds(words, c.words) : words.empty(), words.c_str());
+    if (c.step == std::floor(c.step)) TEST_ASSERT_EQUAL_INT(c.met, met);
+  }
+  // One true pose a second is no frame number: each has its time.
+  TruePoses truth;
+  for (int i = 0; i < 4; ++i) truth.poses.push_back({double(i), turning_flight()[15 * i].pose});
+  TEST_ASSERT_TRUE(fit_times(turning_flight(), truth, clock_of_60("frame")).empty());
+  TEST_ASSERT_EQUAL_DOUBLE(3, truth.poses[3].time_s);
+}
+
 }  // namespace
 
 int main() {
   UNITY_BEGIN();
   RUN_TEST(test_a_clock_that_falls_and_rises_again_began_anew);
+  RUN_TEST(test_a_truth_with_the_other_order_of_its_quaternions_is_told_from_the_right_one);
+  RUN_TEST(test_times_that_are_frame_numbers_are_understood_and_said);
   RUN_TEST(test_auc_is_the_area_under_straight_lines_of_recall);
   RUN_TEST(test_percentile_lies_between_its_neighbours);
   RUN_TEST(test_a_distance_has_the_sigma_that_the_pose_gives_it);

@@ -58,6 +58,13 @@ class Truths(CliTest):
         self.assertIn("the truth's times, 1700000000 to 1700000000.76 s, and the path's, 0 to 0.76",
                       result["notes"][0])
 
+    def test_numbers_of_frames_are_no_seconds(self):
+        numbered = "".join(f"{i} {0.1 * i} 0 0 0 0 0 1\n" for i in range(COUNT))
+        result = self.compare(numbered)
+        self.assertEqual(result["truth"]["num_compared"], COUNT)
+        self.assertIn("the truth's times were taken as the numbers in the pictures' names",
+                      result["notes"][0])
+
     def test_a_truth_that_stays_in_one_place_loses_no_result(self):
         done = self.run_with(lines(lambda t, x: f"{t:.6f} 1 2 3 0 0 0 1"))
         self.succeed(done)

@@ -325,6 +325,20 @@ class Readers(unittest.TestCase):
         poses.write_tum(self.path, self.truth)
         self.assert_same(poses.read_poses(self.path))
 
+    def test_a_comment_that_names_the_columns_gives_their_order(self):
+        poses.write_tum(self.path, self.truth)
+        with open(self.path, encoding="utf-8") as file:
+            lines = [line.split() for line in file if not line.startswith("#")]
+        for names in ("# timestamp tx ty tz qw qx qy qz", "#time [s], x [m], y [m], z [m], q_w, "
+                      "q_x, q_y, q_z", "# qw first, as timestamp tx ty tz qw qx qy qz"):
+            self.write(names + "\n" + "".join(
+                " ".join((*line[:4], line[7], *line[4:7])) + "\n" for line in lines))
+            if "first" in names:  # a sentence is no list of names
+                self.assertGreater(abs(poses.read_poses(self.path).rotations
+                                       - self.truth.rotations).max(), 0.1)
+            else:
+                self.assert_same(poses.read_poses(self.path), segments=False)
+
     def test_euroc_is_the_bodys_path_moved_to_the_camera(self):
         body_from_cam = np.eye(4)
         body_from_cam[:3, :3], body_from_cam[:3, 3] = turn([1, 2, 3], 1.0), [0.1, -0.2, 0.3]

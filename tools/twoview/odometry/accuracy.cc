@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <opencv2/core.hpp>
-#include <set>
 
 namespace cli {
 namespace {
@@ -92,59 +90,6 @@ Similarity fitted(const std::vector<Vector3>& from, const std::vector<Vector3>& 
   const Vector3 turned = applied(fit.R, mean_from);
   for (size_t k = 0; k < 3; ++k) fit.t[k] = mean_to[k] - fit.scale * turned[k];
   return fit;
-}
-
-std::string fit_times(const Trajectory& estimate, TruePoses& truth, double film_start_s) {
-  constexpr size_t kFewest = 3;
-  if (truth.unit_s == 0 || estimate.size() < kFewest || truth.poses.size() < kFewest) return "";
-  // How many poses of the one have a pose of the other for themselves.
-  const auto num_met = [&](const Trajectory& poses) {
-    std::set<size_t> own, others;
-    for (const Association& pair : associated(estimate, poses)) {
-      own.insert(pair.idx_estimate);
-      others.insert(pair.idx_truth);
-    }
-    return std::min(own.size(), others.size());
-  };
-  if (num_met(truth.poses) >= kFewest) return "";
-  struct Reading {
-    const char* words;
-    double unit_s, start_s;
-  };
-  const Reading readings[] = {
-      {"seconds", 1, 0},
-      {"milliseconds", 1e-3, 0},
-      {"microseconds", 1e-6, 0},
-      {"nanoseconds", 1e-9, 0},
-      {"seconds of the film's own clock", 1, film_start_s},
-  };
-  const Reading* best = nullptr;
-  size_t most = kFewest - 1;
-  Trajectory chosen;
-  for (const Reading& reading : readings) {
-    Trajectory poses = truth.poses;
-    for (TimedPose& at : poses)
-      at.time_s = at.time_s / truth.unit_s * reading.unit_s - reading.start_s;
-    const size_t count = num_met(poses);
-    if (count <= most) continue;
-    most = count;
-    best = &reading;
-    chosen = poses;
-  }
-  if (best != nullptr) {
-    truth.poses = chosen;
-    truth.unit_s = best->unit_s;
-    return std::string("the truth's times were taken as ") + best->words + ": then " +
-           std::to_string(most) + " of its poses have a time of the path";
-  }
-  char text[240];
-  std::snprintf(
-      text, sizeof text,
-      "the truth's times, %.15g to %.15g s, and the path's, %.15g to %.15g s, do not meet "
-      "(to 0.01 s), in s, ms, us or ns: are they of one clock?",
-      truth.poses.front().time_s, truth.poses.back().time_s, estimate.front().time_s,
-      estimate.back().time_s);
-  return text;
 }
 
 Accuracy accuracy_of(const Trajectory& estimate, const Trajectory& truth) {

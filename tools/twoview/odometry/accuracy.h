@@ -43,12 +43,6 @@ struct Accuracy {
   std::vector<double> errors;  // of each associated pose, after the similarity
   std::vector<Association> pairs;
 };
-// Where fewer than three poses of the truth belong to poses of the estimate: takes its times as
-// those of another unit (s, ms, us, ns), or as of the film's own clock, which began at
-// film_start_s, where that makes them belong together. Returns a line on what was done, or on why
-// nothing meets; empty where enough poses meet as they are.
-std::string fit_times(const Trajectory& estimate, TruePoses& truth, double film_start_s);
-
 Accuracy accuracy_of(const Trajectory& estimate, const Trajectory& truth);
 
 }  // namespace cli

@@ -560,7 +560,8 @@ int odometry(Arguments& a) {
   const std::optional<FilmFacts> film = source->film();
   FlightResult result = result_of(flight, truth, film ? film->clock_start_s : 0,
                                   wanted < 0 ? static_cast<int>(flight.frames().size()) : wanted);
-  if (!result.truth_note.empty()) common.note(result.truth_note);
+  for (const std::string& note : {result.truth_note, result.rotation_note})
+    if (!note.empty()) common.note(note);
   if (!flight.still_mask().empty()) common.note(still_note(result));
 #ifdef TWOVIEW_HAS_ROOM
   const FlightRoom room = room_of(a, *source, result, true_room, stop);

@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 
+#include "odometry/truth_fit.h"
 #include "report/ply.h"
 
 namespace cli {
@@ -215,6 +216,21 @@ Trajectory live_trajectory_of(const Flight& flight, const LiveStretch& stretch) 
   return trajectory;
 }
 
+namespace {
+
+FrameClock clock_of(const Flight& flight, double film_start_s) {
+  FrameClock clock;
+  clock.film_start_s = film_start_s;
+  for (const FlightFrame& frame : flight.frames()) {
+    clock.numbers.push_back(frame.index);
+    clock.times_s.push_back(frame.time_s);
+    clock.names.push_back(frame.name);
+  }
+  return clock;
+}
+
+}  // namespace
+
 FlightResult result_of(const Flight& flight, const std::optional<TruePoses>& truth,
                        double film_start_s, int num_source_frames) {
   FlightResult result;
@@ -230,7 +246,8 @@ FlightResult result_of(const Flight& flight, const std::optional<TruePoses>& tru
     result.has_truth = true;
     TruePoses fitted = *truth;
     const Trajectory path = trajectory_of(flight, result.segment);
-    result.truth_note = fit_times(path, fitted, film_start_s);
+    result.truth_note = fit_times(path, fitted, clock_of(flight, film_start_s));
+    result.rotation_note = rotation_words(path, fitted);
     result.truth = fitted.poses;
     result.accuracy = accuracy_of(path, result.truth);
     result.live_accuracy =

@@ -33,7 +33,8 @@ struct FlightResult {
   LiveStretch live_stretch;
   bool has_truth = false;
   Trajectory truth;
-  std::string truth_note;            // on its times; empty where there is nothing to say
+  // On the truth's times, and on its rotations; empty where there is nothing to say.
+  std::string truth_note, rotation_note;
   Accuracy accuracy, live_accuracy;  // of the segment, and of that stretch
   nlohmann::ordered_json json;
 };

@@ -122,6 +122,39 @@ Layout layout_of_names(const std::string& file, const TextLine& line) {
   return layout;
 }
 
+// The columns by a comment above the poses, such as "# timestamp tx ty tz qw qx qy qz"; none where
+// it does not name each of them among as many words as a line has numbers.
+std::optional<std::array<size_t, 8>> columns_of_comment(std::string_view comment, size_t count) {
+  std::vector<std::string> names;
+  for (const std::string_view word : words_of(comment, kSeparators)) {
+    std::string unit;
+    std::string name = plain_name(word, unit);
+    if (!name.empty()) names.push_back(std::move(name));  // units in brackets are dropped
+  }
+  std::array<size_t, 8> at{};
+  for (size_t column = 0; column < 8; ++column) {
+    const auto found = std::find_if(names.begin(), names.end(), [&](const std::string& name) {
+      const auto& known = kNames[column];
+      return std::find(known.begin(), known.end(), name) != known.end();
+    });
+    at[column] = static_cast<size_t>(found - names.begin());
+    if (at[column] >= std::min(count, names.size())) return {};
+  }
+  return at;
+}
+
+// The last comment before the line `first` of the text.
+std::string_view comment_above(std::string_view text, int first) {
+  std::string_view comment;
+  for (int number = 1; number < first && !text.empty(); ++number) {
+    const std::string_view line = text.substr(0, text.find('\n'));
+    text.remove_prefix(std::min(line.size() + 1, text.size()));
+    const size_t begin = line.find_first_not_of(" \t");
+    if (begin != line.npos && line[begin] == '#') comment = line;
+  }
+  return comment;
+}
+
 bool is_whole(std::string_view word) { return word.find_first_of(".eE") == word.npos; }
 
 // The layout by the first line of numbers.
@@ -207,14 +240,21 @@ TruePoses load_trajectory(const std::string& file, const std::vector<double>& fr
   double ignored = 0;
   const bool has_names = !to_number(words_of(lines[0].text, kSeparators)[0], ignored) &&
                          std::isdigit(static_cast<unsigned char>(lines[0].text[0])) == 0;
-  const Layout layout =
-      has_names ? layout_of_names(file, lines[0]) : layout_of_numbers(file, lines[0]);
+  Layout layout = has_names ? layout_of_names(file, lines[0]) : layout_of_numbers(file, lines[0]);
+  TruePoses truth;
+  truth.unit_s = layout.unit_s;
+  const auto named = has_names || layout.is_matrix
+                         ? std::nullopt
+                         : columns_of_comment(comment_above(text, lines[0].number), layout.count);
+  if (named) {
+    layout.at = *named;
+  } else if (!has_names && !layout.is_matrix && !(layout.is_body && body_from_camera)) {
+    truth.order = layout.is_body ? TruePoses::Order::kScalarFirst : TruePoses::Order::kScalarLast;
+  }
   if (has_names) lines.erase(lines.begin());
   if (lines.empty()) throw BadInput(file + ": no pose in it");
   if (layout.is_matrix && frame_times.empty())
     throw BadInput(file + " has KITTI's poses without times, and the frames' times are not known");
-  TruePoses truth;
-  truth.unit_s = layout.unit_s;
   for (const TextLine& line : lines) {
     const std::vector<double> n = numbers_in(file, line);
     if (n.size() != layout.count)

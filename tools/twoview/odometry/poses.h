@@ -38,14 +38,17 @@ std::string tum_line(double time_s, const Pose& pose);
 struct TruePoses {
   Trajectory poses;
   double unit_s = 1;  // of the file's times, in seconds; 0: the file has no times (KITTI)
+  // The order of the quaternions where no line of names gives it: then it may be the other one.
+  enum class Order { kKnown, kScalarLast, kScalarFirst } order = Order::kKnown;
 };
 
 // Reads true poses: TUM's lines; EuRoC's data.csv (nanoseconds, position, quaternion w x y z, more
 // columns); the same with a line of names before them, by which the columns are chosen; or KITTI's
 // lines of 12 numbers (16 with the row 0 0 0 1), which have no times and belong to `frame_times`
-// one by one. Blanks, commas and semicolons separate. Eight numbers with commas and no names are
-// EuRoC's where the times are whole numbers, else TUM's. body_from_camera: of EuRoC's poses, which
-// are the vehicle's; empty: taken as the camera's. Throws BadInput that names the line.
+// one by one. A comment above the first pose that names each column counts, too. Blanks, commas and
+// semicolons separate. Eight numbers with commas and no names are EuRoC's where the times are whole
+// numbers, else TUM's. body_from_camera: of EuRoC's poses, which are the vehicle's; empty: taken as
+// the camera's. Throws BadInput that names the line.
 TruePoses load_trajectory(const std::string& file, const std::vector<double>& frame_times,
                           const std::optional<std::array<double, 12>>& body_from_camera);
 

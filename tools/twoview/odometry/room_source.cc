@@ -14,6 +14,7 @@
 #include "odometry/accuracy.h"
 #include "odometry/numbers.h"
 #include "odometry/stored_source.h"
+#include "odometry/truth_fit.h"
 #include "room_model/posed_points.h"
 
 namespace cli {
@@ -239,8 +240,13 @@ RoomSource room_source_of_poses(const std::string& path, const std::string& pose
                never);
   }
   for (const double time : times) frames.push_back({time, {}});
-  const Trajectory path_of_file = load_trajectory(poses, times, source.body_from_camera()).poses;
+  TruePoses given_poses = load_trajectory(poses, times, source.body_from_camera());
   const std::vector<std::string> names = source.names();
+  FrameClock clock{source.film() ? source.film()->clock_start_s : 0, indices, times, names};
+  if (clock.names.size() != times.size()) clock.names.clear();
+  const std::string note = fit_times(frames, given_poses, clock);
+  if (!note.empty()) made.notes.push_back(note);
+  const Trajectory& path_of_file = given_poses.poses;
   std::set<int> wanted;
   for (const Association& pair : associated(frames, path_of_file)) {
     const int index = indices[pair.idx_estimate];
@@ -251,7 +257,8 @@ RoomSource room_source_of_poses(const std::string& path, const std::string& pose
     wanted.insert(index);
   }
   if (made.scene.views.empty())
-    throw BadInput(poses + ": no pose has the time of a frame (within 0.01 s)");
+    throw BadInput(poses + ": no pose has the time of a frame (within 0.01 s)" +
+                   (note.empty() ? "" : ": " + note));
   const SourceFrame first = first_frame(source, wanted);
   if (!given) given = source.camera(first, first.luma.cols, first.luma.rows);
   if (!given) throw BadInput("--camera is required: " + source.kind() + " does not describe it");
@@ -331,9 +338,16 @@ TruePath true_path(const RoomSource& from, const std::string& file) {
   if (path.is_own || name.empty()) return path;
   TruePoses truth = load_trajectory(name, from.source->times(), from.source->body_from_camera());
   Trajectory own;
-  for (const RoomView& view : from.scene.views) own.push_back({view.time_s, {view.R, view.t}});
+  FrameClock clock;
   const std::optional<FilmFacts> film = from.source->film();
-  path.problem = fit_times(own, truth, film ? film->clock_start_s : 0);
+  if (film) clock.film_start_s = film->clock_start_s;
+  for (const RoomView& view : from.scene.views) {
+    own.push_back({view.time_s, {view.R, view.t}});
+    clock.numbers.push_back(view.index);
+    clock.times_s.push_back(view.time_s);
+    clock.names.push_back(view.name);
+  }
+  path.problem = fit_times(own, truth, clock);
   path.poses = truth.poses;
   return path;
 }

@@ -6,6 +6,9 @@
 | EuRoC | `time,px,py,pz,qw,qx,qy,qz[,...]`, nanoseconds | world from body; needs T_BS |
 | KITTI | 12 numbers, a row-major 3 x 4; the times are in another file | world from camera |
 
+A comment above TUM's poses that names each column, such as `# timestamp tx ty tz qw qx qy qz`, says
+their order, as in the program (tools/twoview/odometry/poses.cc).
+
 In trajectories of `twoview odometry` a comment `# segment N` begins a segment; poses of different
 segments do not compare. Lines that begin with # are otherwise skipped.
 """
@@ -124,18 +127,34 @@ def _sorted(rows, path):
         raise PoseError(f"{path}: the times do not increase")
 
 
+_NAMES = ("timestamp|time|t|stamp|secs?|seconds", "tx|x|px|p_x|pos_x|position_x",
+          "ty|y|py|p_y|pos_y|position_y", "tz|z|pz|p_z|pos_z|position_z",
+          *(f"q{axis}|q_{axis}|quat_{axis}|rot_{axis}|orientation_{axis}" for axis in "xyzw"))
+
+
+def _columns_of_comment(comment):
+    """The columns of time, position and quaternion x y z w by a comment that names all of them;
+    None for another comment."""
+    plain = re.sub(r"[\[(][^\])]*[\])]|[#\"',;]", " ", comment.lower())
+    words = [re.sub(r"_(s|ms|us|ns)$", "", word) for word in plain.split()][:8]
+    found = [next((k for k, word in enumerate(words) if re.fullmatch(names, word)), None)
+             for names in _NAMES]
+    return None if None in found else found
+
+
 def read_tum(path):
     """The poses of a TUM file, with the segments of `twoview odometry`. An empty file has none."""
-    rows, segments, segment = [], [], 0
+    rows, segments, segment, columns = [], [], 0, list(range(8))
     for number, line in _lines(path):
         if line.startswith("#"):
             named = re.match(r"#\s*segment\s+(\d+)", line)
             segment = int(named.group(1)) if named else segment
+            columns = columns if rows else _columns_of_comment(line) or list(range(8))
             continue
         values = _numbers(line.replace(",", " "), None, path, number)
         if len(values) != 8 or not any(values[4:]):
             raise PoseError(f"{path}: line {number}: not time tx ty tz qx qy qz qw")
-        rows.append(values)
+        rows.append([values[column] for column in columns])
         segments.append(segment)
     _sorted(rows, path)
     rows = np.array(rows).reshape(-1, 8)
