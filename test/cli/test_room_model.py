@@ -24,6 +24,9 @@ from test_odometry import (CAMERAS, COUNT, FOCAL, HEIGHT, LUMA, PICTURES, SHIFTS
 STEP = 0.1  # units of the truth between two frames
 DEPTHS = [FOCAL * STEP / shift for shift in SHIFTS]  # of the walls
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+ROOT = Path(__file__).resolve().parents[2]
+# Installed by scripts/check_glb; tests fetch nothing.
+VALIDATOR = ROOT / ".cache/gltf_validator/node_modules/gltf-validator"
 # Runs in the page: stands where the camera was in the middle of its path, turns until a wall is in
 # the middle of the picture, and measures across it as a user does, with clicks.
 PROBE = """<script>
@@ -297,6 +300,14 @@ class RoomTest(CliTest):
         heights = [p[1] + v["y"] for p, v in zip(positions, vertices)]
         self.assertLess(max(heights) - min(heights), 0.1 * (accessor["max"][1] -
                                                             accessor["min"][1]))
+        if VALIDATOR.is_dir():
+            self.assert_valid(self.out / "room.glb")
+
+    def assert_valid(self, path):
+        """To the Khronos glTF validator, which has nothing to say against the file."""
+        done = subprocess.run([ROOT / "scripts/check_glb", path], capture_output=True, timeout=60)
+        self.assertEqual(done.returncode, 0, done.stdout.decode() + done.stderr.decode())
+        self.assertIn(b"0 errors, 0 warnings, 0 infos", done.stdout)
 
     def test_odometry_makes_the_room_at_once(self):
         self.succeed(self.room())
