@@ -197,13 +197,13 @@ static void test_memory_is_known_beforehand_and_rung_3_takes_16_mib_at_most_at_v
 
 /* Of large pictures with few keypoints the extraction needs most, and nothing is left over from
    other stages: a byte that the size query forgets is a null pointer then. */
-static void test_large_pictures_have_memory_on_every_rung(void) {
+static void test_large_pictures_have_memory_on_the_highest_rung(void) {
   enum { WIDE = 740, HIGH = 1290, FEW = 2000 };
   static uint8_t large[2][WIDE * HIGH];
   tv_camera of_large = camera;
   tv_limits limits = limits_of(3);
   api_context b;
-  int32_t v, rung;
+  int32_t v;
   of_large.width = limits.max_width = WIDE;
   of_large.height = limits.max_height = HIGH;
   limits.max_keypoints = FEW;
@@ -214,10 +214,8 @@ static void test_large_pictures_have_memory_on_every_rung(void) {
     views[v] = view_of(api_image(large[v], WIDE, HIGH, WIDE), &of_large, NULL);
   }
   memmove(large[1], large[1] + 20, sizeof large[1] - 20);
-  for (rung = 2; rung < RUNGS; ++rung) {
-    TEST_ASSERT_EQUAL_INT(TV_OK, run_in(b.context, rung, 0));
-    TEST_ASSERT_TRUE(reconstruction.num_keypoints[0] > FEW);
-  }
+  TEST_ASSERT_EQUAL_INT(TV_OK, run_in(b.context, 3, 0));
+  TEST_ASSERT_TRUE(reconstruction.num_keypoints[0] > FEW);
   api_release(&b);
 }
 
@@ -552,7 +550,7 @@ int main(void) {
   RUN_TEST(test_an_effort_out_of_its_range_is_refused);
   RUN_TEST(test_limits_too_small_for_the_rung_have_a_status_of_their_own);
   RUN_TEST(test_memory_is_known_beforehand_and_rung_3_takes_16_mib_at_most_at_vga);
-  RUN_TEST(test_large_pictures_have_memory_on_every_rung);
+  RUN_TEST(test_large_pictures_have_memory_on_the_highest_rung);
   RUN_TEST(test_a_rung_of_0_gives_what_a_context_without_effort_gives);
   RUN_TEST(test_a_wall_at_a_slant_is_matched_in_squeezed_views);
   RUN_TEST(test_no_two_matches_of_squeezed_views_are_of_one_place);
