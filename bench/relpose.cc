@@ -82,7 +82,7 @@ Counters errors_of(const Samples& samples) {
 }
 
 void add_ours(const std::string& name, const std::shared_ptr<Samples>& samples, int at_once) {
-  const tvk_table* kernels = tvk_select(bench::kernels_in_use());
+  const tvk_geometry_table* kernels = tvk_geometry_of(tvk_select(bench::kernels_in_use()));
   const auto essentials = std::make_shared<std::vector<double>>(9 * TVK_RELPOSE_MODELS * TVK_WIDTH);
   const auto solve = [=](int first, bool keep) {
     double rays[30 * TVK_WIDTH];

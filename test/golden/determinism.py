@@ -117,7 +117,7 @@ def build(folder, architecture, compiler, level, keep_footprint):
     targets = ["golden_digest"]
     if keep_footprint and architecture != "x86-64":
         targets += ["twoview", "twoview_without_room", "twoview_without_dense",
-                    "twoview_without_odometry"]
+                    "twoview_without_odometry", "twoview_static"]
         options += ["-DCMAKE_C_COMPILER_LAUNCHER=", "-DCMAKE_CXX_COMPILER_LAUNCHER="]
     configured = there / "configured_with"
     if not configured.exists() or configured.read_text() != repr(options):

@@ -43,7 +43,7 @@ typedef struct block {
 
 /* One run of a case: the same seed gives the same inputs to every kernel set. */
 typedef struct trial {
-  const tvk_table *set;
+  const tvk_set *set;
   uint64_t seed;
   int typical;   /* 1: use the sizes of a 640 x 480 image, for --time */
   int64_t calls; /* number of calls of the kernel on the same input */
@@ -113,7 +113,7 @@ static void case_fast_score_row(trial *t) {
   int k;
   for (k = 0; k < 7; ++k) rows[k] = row_of_bytes(t, width);
   scores = OUTPUT(t, uint8_t, width);
-  REPEAT(t, t->set->fast_score_row(rows, width, arc, threshold, scores));
+  REPEAT(t, tvk_detect_of(t->set)->fast_score_row(rows, width, arc, threshold, scores));
 }
 
 static void case_hessian_determinants(trial *t) {
@@ -131,7 +131,7 @@ static void case_hessian_determinants(trial *t) {
     const int32_t y = last ? height - REACH - 1 : random_int(&t->seed, REACH, height - REACH - 1);
     centres[k] = image + y * stride + x;
   }
-  REPEAT(t, t->set->hessian_determinants(centres, stride, determinants));
+  REPEAT(t, tvk_detect_of(t->set)->hessian_determinants(centres, stride, determinants));
   /* The eighth entry of a row may hold anything, so it is not compared. */
   for (k = 0; k < 2 * 7; ++k) determinants[8 * k + 7] = 0;
 }
@@ -152,7 +152,7 @@ static void case_suppress_row(trial *t) {
   }
   xs = OUTPUT(t, uint16_t, room);
   found = OUTPUT(t, int32_t, 1);
-  REPEAT(t, *found = t->set->suppress_row(rows[0], rows[1], rows[2], width, xs));
+  REPEAT(t, *found = tvk_detect_of(t->set)->suppress_row(rows[0], rows[1], rows[2], width, xs));
   TEST_ASSERT_TRUE(*found >= 0 && *found <= room);
   /* The entries of xs after the columns found may hold anything, so they are not compared. */
   memset(xs + *found, PATTERN, (size_t)(room - *found) * sizeof xs[0]);
@@ -183,7 +183,7 @@ static void case_average_columns(trial *t) {
     for (k = 0; k < 3; ++k) columns.weights[k][x] = (uint16_t)weights[k];
   }
   sums = OUTPUT(t, uint16_t, padded);
-  REPEAT(t, t->set->average_columns(row, &columns, out_width, sums));
+  REPEAT(t, tvk_detect_of(t->set)->average_columns(row, &columns, out_width, sums));
   /* The sums after the last column may hold anything, so they are not compared. */
   for (x = out_width; x < padded; ++x) sums[x] = 0;
 }
@@ -201,7 +201,7 @@ static void case_average_rows(trial *t) {
   }
   random_weights(t, weights);
   out = OUTPUT(t, uint8_t, width);
-  REPEAT(t, t->set->average_rows(rows, weights, width, out));
+  REPEAT(t, tvk_detect_of(t->set)->average_rows(rows, weights, width, out));
 }
 
 static void case_squeeze_row(trial *t) {
@@ -211,7 +211,7 @@ static void case_squeeze_row(trial *t) {
   const uint8_t *row = row_of_bytes(t, width);
   uint32_t *sums = OUTPUT(t, uint32_t, width);
   uint16_t *out = OUTPUT(t, uint16_t, out_width);
-  REPEAT(t, t->set->squeeze_row(row, width, begin, step, out_width, sums, out));
+  REPEAT(t, tvk_squeeze_of(t->set)->squeeze_row(row, width, begin, step, out_width, sums, out));
   memset(sums, 0, (size_t)width * sizeof *sums); /* unspecified, so not compared */
 }
 
@@ -229,14 +229,14 @@ static void case_mix_rows(trial *t) {
     rest -= weights[k];
   }
   out = OUTPUT(t, uint8_t, width);
-  REPEAT(t, t->set->mix_rows(rows, weights, width, out));
+  REPEAT(t, tvk_squeeze_of(t->set)->mix_rows(rows, weights, width, out));
 }
 
 static void case_halve_row(trial *t) {
   const int32_t out_width = pick(t, 1, 200, 320);
   const uint8_t *a = row_of_bytes(t, 2 * out_width), *b = row_of_bytes(t, 2 * out_width);
   uint8_t *out = OUTPUT(t, uint8_t, out_width);
-  REPEAT(t, t->set->halve_row(a, b, out_width, out));
+  REPEAT(t, tvk_detect_of(t->set)->halve_row(a, b, out_width, out));
 }
 
 static void case_blur_row(trial *t) {
@@ -244,7 +244,7 @@ static void case_blur_row(trial *t) {
   const uint8_t *above = row_of_bytes(t, width), *row = row_of_bytes(t, width);
   const uint8_t *below = random_int(&t->seed, 0, 3) == 0 ? row : row_of_bytes(t, width);
   uint8_t *out = OUTPUT(t, uint8_t, width);
-  REPEAT(t, t->set->blur_row(above, row, below, width, out));
+  REPEAT(t, tvk_describe_of(t->set)->blur_row(above, row, below, width, out));
 }
 
 static void case_pair_rows(trial *t) {
@@ -252,7 +252,7 @@ static void case_pair_rows(trial *t) {
   const uint8_t *row = row_of_bytes(t, width);
   const uint8_t *below = random_int(&t->seed, 0, 3) == 0 ? row : row_of_bytes(t, width);
   uint16_t *pairs = OUTPUT(t, uint16_t, width + 1);
-  REPEAT(t, t->set->pair_rows(row, below, width, pairs));
+  REPEAT(t, tvk_describe_of(t->set)->pair_rows(row, below, width, pairs));
 }
 
 static void case_sample_patch(trial *t) {
@@ -281,7 +281,8 @@ static void case_sample_patch(trial *t) {
     du_x = random_int(&t->seed, 0, 5 << 15);
     du_y = 0;
   }
-  REPEAT(t, t->set->sample_patch(pairs, width, height, x, y, du_x, du_y, num_rows, patch));
+  REPEAT(t, tvk_describe_of(t->set)->sample_patch(pairs, width, height, x, y, du_x, du_y, num_rows,
+                                                  patch));
 }
 
 /* The range of the samples that sample_patch makes: -LOWEST_SAMPLE to LARGEST_SAMPLE. */
@@ -314,14 +315,14 @@ static const int16_t *random_patches(trial *t, int32_t num_patches, int32_t num_
 static void case_orientation_histogram(trial *t) {
   const int16_t *patch = random_patches(t, 1, TVK_ORIENT_SIDE);
   int32_t *smooth = OUTPUT(t, int32_t, TVK_ORIENT_BINS + 2), *peaks = OUTPUT(t, int32_t, 2);
-  REPEAT(t, t->set->orientation_histogram(patch, smooth, peaks));
+  REPEAT(t, tvk_describe_of(t->set)->orientation_histogram(patch, smooth, peaks));
 }
 
 static void case_gradient_histogram(trial *t) {
   const int32_t num_patches = pick(t, 1, 2, 1);
   const int16_t *patches = random_patches(t, num_patches, TVK_PATCH_SIDE);
   int32_t *histogram = OUTPUT(t, int32_t, TVK_DESCRIPTOR_SIZE), k;
-  REPEAT(t, t->set->gradient_histogram(patches, num_patches, histogram));
+  REPEAT(t, tvk_describe_of(t->set)->gradient_histogram(patches, num_patches, histogram));
   for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) TEST_ASSERT_TRUE(histogram[k] >= 0);
 }
 
@@ -348,7 +349,8 @@ static void case_window_template(trial *t) {
   const int32_t x = window_start(t, width, 0, 9 * step), y = window_start(t, height, 0, 9 * step);
   int16_t *channels = OUTPUT(t, int16_t, TVK_WINDOW_CHANNELS * TVK_WINDOW_SAMPLES);
   int32_t *products = OUTPUT(t, int32_t, TVK_WINDOW_PRODUCTS);
-  REPEAT(t, t->set->window_template(pixels, stride, width, x, y, step, channels, products));
+  REPEAT(t, tvk_align_of(t->set)->window_template(pixels, stride, width, x, y, step, channels,
+                                                  products));
 }
 
 /* How far the samples lie from the first one, before and after it, along one axis. */
@@ -378,7 +380,7 @@ static void case_window_sums(trial *t) {
   {
     const int32_t x = window_start(t, width, reach[0][0], reach[0][1]);
     const int32_t y = window_start(t, height, reach[1][0], reach[1][1]);
-    REPEAT(t, t->set->window_sums(pixels, stride, x, y, map, channels, sums));
+    REPEAT(t, tvk_align_of(t->set)->window_sums(pixels, stride, x, y, map, channels, sums));
   }
 }
 
@@ -396,7 +398,7 @@ static void case_quantize_descriptors(trial *t) {
           spikes && random_int(&t->seed, 0, 63) > 0 ? 0 : value;
     }
   }
-  REPEAT(t, t->set->quantize_descriptors(histograms, count, root, descriptors));
+  REPEAT(t, tvk_describe_of(t->set)->quantize_descriptors(histograms, count, root, descriptors));
 }
 
 static int is_pattern(const uint8_t *begin, const uint8_t *end) {
@@ -524,7 +526,8 @@ static void case_nearest_groups(trial *t) {
   tvk_nearest_shape shape = {0, 0, 0};
   int32_t k;
   while ((uintptr_t)aligned % 64 != 0) ++aligned;
-  REPEAT(t, shape = t->set->nearest_groups(&rows, &columns, aligned, of_columns, of_rows));
+  REPEAT(t, shape = tvk_match_of(t->set)->nearest_groups(&rows, &columns, aligned, of_columns,
+                                                         of_rows));
   TEST_ASSERT_TRUE(is_pattern(scratch, aligned));
   TEST_ASSERT_TRUE(is_pattern(aligned + scratch_bytes, scratch + scratch_bytes + 64));
   memset(scratch, PATTERN, scratch_bytes + 64);
@@ -547,7 +550,7 @@ static void case_squared_distances(trial *t) {
   const uint8_t *rows = random_descriptors(t, num_rows, query, 1);
   int32_t *indices = INPUT(t, int32_t, count), *out = OUTPUT(t, int32_t, count), k;
   for (k = 0; k < count; ++k) indices[k] = random_int(&t->seed, 0, num_rows - 1);
-  REPEAT(t, t->set->squared_distances(query, rows, indices, count, out));
+  REPEAT(t, tvk_match_of(t->set)->squared_distances(query, rows, indices, count, out));
 }
 
 /* Rays near the axis, with slopes of a lens whose focal length is about 500 pixels. In three of
@@ -600,7 +603,8 @@ static match_arrays take_matches(trial *t) {
 static void case_sampson_squares(trial *t) {
   const match_arrays a = take_matches(t);
   double *squares = OUTPUT(t, double, a.count);
-  REPEAT(t, t->set->sampson_squares(a.read, a.indices, a.first, a.count, a.on_plane, a.m, squares));
+  REPEAT(t, tvk_geometry_of(t->set)->sampson_squares(a.read, a.indices, a.first, a.count,
+                                                     a.on_plane, a.m, squares));
 }
 
 static void case_pose_squares(trial *t) {
@@ -613,14 +617,15 @@ static void case_pose_squares(trial *t) {
   for (k = 0; k < a.n; ++k) angle[k] = 0.01 * random_unit(&t->seed);
   for (k = 0; k < 21; ++k) pose[k] = 2 * random_unit(&t->seed) - 1;
   read[18] = angle;
-  REPEAT(t, t->set->pose_squares(read, a.first, a.count, a.on_plane, pose, 1.5, squares));
+  REPEAT(t, tvk_geometry_of(t->set)->pose_squares(read, a.first, a.count, a.on_plane, pose, 1.5,
+                                                  squares));
 }
 
 static void case_transfer_squares(trial *t) {
   const match_arrays a = take_matches(t);
   double *squares = OUTPUT(t, double, a.count);
-  REPEAT(t,
-         t->set->transfer_squares(a.read, a.indices, a.first, a.count, a.on_plane, a.m, squares));
+  REPEAT(t, tvk_geometry_of(t->set)->transfer_squares(a.read, a.indices, a.first, a.count,
+                                                      a.on_plane, a.m, squares));
 }
 
 typedef void sums_kernel(const double *const *, const int32_t *, int32_t, int32_t, int32_t,
@@ -635,10 +640,12 @@ static void check_sums(trial *t, sums_kernel *kernel, int32_t num_sums) {
   REPEAT(t, kernel(a.read, a.indices, a.first, a.count, a.on_plane, a.m, 1.0, cauchy, sums));
 }
 
-static void case_sampson_sums(trial *t) { check_sums(t, t->set->sampson_sums, TVK_SAMPSON_SUMS); }
+static void case_sampson_sums(trial *t) {
+  check_sums(t, tvk_geometry_of(t->set)->sampson_sums, TVK_SAMPSON_SUMS);
+}
 
 static void case_transfer_sums(trial *t) {
-  check_sums(t, t->set->transfer_sums, TVK_TRANSFER_SUMS);
+  check_sums(t, tvk_geometry_of(t->set)->transfer_sums, TVK_TRANSFER_SUMS);
 }
 
 static void case_sampson_score(trial *t) {
@@ -662,8 +669,8 @@ static void case_sampson_score(trial *t) {
     read[k] = array;
   }
   for (k = 0; k < 9; ++k) m[k] = (float)(2 * random_unit(&t->seed) - 1);
-  REPEAT(t, *score = t->set->sampson_score(read, first_block, num_lists - first_block, on_plane, m,
-                                           inverse_sq));
+  REPEAT(t, *score = tvk_geometry_of(t->set)->sampson_score(
+                read, first_block, num_lists - first_block, on_plane, m, inverse_sq));
 }
 
 /* Rays of random points seen from two places; some samples are degenerate: equal matches, zeros. */
@@ -689,7 +696,7 @@ static void case_relpose_5pt(trial *t) {
       }
     }
   }
-  REPEAT(t, t->set->relpose_5pt(rays, num_samples, essentials, counts));
+  REPEAT(t, tvk_geometry_of(t->set)->relpose_5pt(rays, num_samples, essentials, counts));
   for (s = 0; s < TVK_WIDTH; ++s) { /* outputs beyond the models found are not compared */
     const int32_t count = s < num_samples ? counts[s] : 0;
     TEST_ASSERT_TRUE(count >= 0 && count <= TVK_RELPOSE_MODELS);
@@ -736,11 +743,12 @@ static void case_triangulate(trial *t) {
     }
     if (kind == 3) pixels0[2 * k] = random_int(&t->seed, 0, 1) ? 1e200 : NAN;
   }
-  REPEAT(t, *any = t->set->triangulate(pair,
-                                       method == 0   ? TV_TRIANGULATION_MIDPOINT
-                                       : method == 1 ? TV_TRIANGULATION_LINEAR_LS
-                                                     : TV_TRIANGULATION_ITERATIVE_LS,
-                                       pixels0, pixels1, num, points));
+  REPEAT(t,
+         *any = tvk_geometry_of(t->set)->triangulate(pair,
+                                                     method == 0   ? TV_TRIANGULATION_MIDPOINT
+                                                     : method == 1 ? TV_TRIANGULATION_LINEAR_LS
+                                                                   : TV_TRIANGULATION_ITERATIVE_LS,
+                                                     pixels0, pixels1, num, points));
   for (k = 0; k < num; ++k) expected |= points[k].status < 0;
   TEST_ASSERT_EQUAL_INT(expected, *any);
 }
@@ -1114,7 +1122,7 @@ static void case_choose_planes(trial *t) {
 }
 #endif
 
-static trial make_trial(const tvk_table *set, uint64_t seed, int typical, int64_t calls) {
+static trial make_trial(const tvk_set *set, uint64_t seed, int typical, int64_t calls) {
   trial t;
   memset(&t, 0, sizeof t);
   t.set = set;
@@ -1146,9 +1154,9 @@ static const char *difference(const trial *expected, const trial *actual) {
    instructions. */
 static const char *name_of(int32_t n) {
   static char name[16];
-  const tvk_table *table = tvk_nth(n), *below = tvk_nth(n - 1);
-  snprintf(name, sizeof name, "%s%s", tv_kernels_string((tv_kernels)table->set),
-           below != NULL && below->set == table->set ? "+" : "");
+  const tvk_set *table = tvk_nth(n), *below = tvk_nth(n - 1);
+  snprintf(name, sizeof name, "%s%s", tv_kernels_string((tv_kernels)table->id),
+           below != NULL && below->id == table->id ? "+" : "");
   return name;
 }
 
@@ -1188,7 +1196,7 @@ static double now_ns(void) {
 
 /* Returns the nanoseconds of a call of the kernel: the least of nine runs, each of as many calls
    as take a millisecond or more. */
-static double time_per_call(const tvk_table *set, void (*run)(trial *)) {
+static double time_per_call(const tvk_set *set, void (*run)(trial *)) {
   double best = 1e30;
   int64_t calls = 1;
   int repeat = 0;
@@ -1236,20 +1244,20 @@ static int print_all_times(void) {
    returns the fastest for TV_KERNELS_AUTO, a set by its number, or null. */
 static void test_the_sets_are_those_of_this_cpu(void) {
   int32_t n, set;
-  const tvk_table *fastest = NULL;
-  TEST_ASSERT_EQUAL_INT(TV_KERNELS_C, tvk_nth(0)->set);
+  const tvk_set *fastest = NULL;
+  TEST_ASSERT_EQUAL_INT(TV_KERNELS_C, tvk_nth(0)->id);
   for (n = 0; tvk_nth(n) != NULL; ++n) {
     fastest = tvk_nth(n);
-    TEST_ASSERT_TRUE(n == 0 || fastest->set >= tvk_nth(n - 1)->set);
-    TEST_ASSERT_EQUAL_INT(fastest->set, tvk_select(fastest->set)->set);
+    TEST_ASSERT_TRUE(n == 0 || fastest->id >= tvk_nth(n - 1)->id);
+    TEST_ASSERT_EQUAL_INT(fastest->id, tvk_select(fastest->id)->id);
     printf("kernel set: %s\n", name_of(n));
   }
   TEST_ASSERT_NULL(tvk_nth(-1));
   TEST_ASSERT_NULL(tvk_nth(n + 1));
   TEST_ASSERT_EQUAL_PTR(fastest, tvk_select(TV_KERNELS_AUTO));
   for (set = -1; set <= TV_KERNELS_NEON + 1; ++set) {
-    const tvk_table *table = tvk_select(set);
-    TEST_ASSERT_TRUE(table == NULL || set == TV_KERNELS_AUTO || table->set == set);
+    const tvk_set *table = tvk_select(set);
+    TEST_ASSERT_TRUE(table == NULL || set == TV_KERNELS_AUTO || table->id == set);
   }
 #if defined(__x86_64__)
   TEST_ASSERT_NOT_NULL(tvk_select(TV_KERNELS_SSE2));

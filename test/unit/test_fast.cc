@@ -55,12 +55,12 @@ void fill_expected(const tv_image& image, int arc) {
   }
 }
 
-void check_score_map(const tvk_table& kernels, const tv_image& image, int arc, int threshold) {
+void check_score_map(const tvk_set& kernels, const tv_image& image, int arc, int threshold) {
   for (int y = 3; y < image.height - 3; ++y) {
     const uint8_t* rows[7];
     uint8_t scores[kMaxWidth];
     for (int k = 0; k < 7; ++k) rows[k] = image.data + (y - 3 + k) * image.stride_bytes;
-    kernels.fast_score_row(rows, image.width, arc, threshold, scores);
+    tvk_detect_of(&kernels)->fast_score_row(rows, image.width, arc, threshold, scores);
     for (int x = 0; x < image.width; ++x) {
       const int score = expected_scores[y][x] >= threshold ? expected_scores[y][x] : 0;
       if (score == scores[x]) continue;
@@ -101,7 +101,7 @@ std::vector<Peak> all_peaks(const tv_image& image, int threshold) {
   return peaks;
 }
 
-void check_corners(const tvk_table& kernels, const tv_image& image, int arc, int threshold) {
+void check_corners(const tvk_set& kernels, const tv_image& image, int arc, int threshold) {
   tv_feature_options options;
   memset(&options, 0, sizeof options);
   options.arc = arc;
@@ -135,7 +135,7 @@ void check_corners(const tvk_table& kernels, const tv_image& image, int arc, int
 // threshold, in their order. With cells: of the peaks that reach the highest threshold at which
 // there are `budget` of them, first the best of each cell up to an even share, then the best of the
 // rest.
-void check_budget(const tvk_table& kernels, const tv_image& image, int budget, int cell_px) {
+void check_budget(const tvk_set& kernels, const tv_image& image, int budget, int cell_px) {
   tv_feature_options options;
   memset(&options, 0, sizeof options);
   options.arc = 9;
@@ -192,7 +192,7 @@ void check_image(const tv_image& image) {
   for (int arc = 9; arc <= 12; ++arc) {
     fill_expected(image, arc);
     for (int set = TV_KERNELS_C; set <= TV_KERNELS_NEON; ++set) {
-      const tvk_table* kernels = tvk_select(set);
+      const tvk_set* kernels = tvk_select(set);
       if (kernels == nullptr) continue;
       for (int threshold : thresholds) {
         check_score_map(*kernels, image, arc, threshold);

@@ -32,7 +32,8 @@ void check_image(const uint8_t* data, int width, int height) {
       const uint8_t* rows[7];
       uint8_t scores[kMaxWidth];
       for (int k = 0; k < 7; ++k) rows[k] = data + (y - 3 + k) * width;
-      tvk_select(TV_KERNELS_AUTO)->fast_score_row(rows, width, 12, threshold, scores);
+      tvk_detect_of(tvk_select(TV_KERNELS_AUTO))
+          ->fast_score_row(rows, width, 12, threshold, scores);
       for (int x = 0; x < width; ++x) TEST_ASSERT_EQUAL_INT(theirs[y][x], scores[x] != 0);
     }
   }

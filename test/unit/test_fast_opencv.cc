@@ -38,13 +38,13 @@ int opencv_corners(const tv_image& image, int threshold, bool suppress) {
 }
 
 void check_unsuppressed(const tv_image& image, int threshold) {
-  const tvk_table& kernels = *tvk_select(TV_KERNELS_AUTO);
+  const tvk_set& kernels = *tvk_select(TV_KERNELS_AUTO);
   opencv_corners(image, threshold, false);
   for (int y = 3; y < image.height - 3; ++y) {
     const uint8_t* rows[7];
     uint8_t scores[kMaxWidth];
     for (int k = 0; k < 7; ++k) rows[k] = image.data + (y - 3 + k) * image.stride_bytes;
-    kernels.fast_score_row(rows, image.width, 9, threshold, scores);
+    tvk_detect_of(&kernels)->fast_score_row(rows, image.width, 9, threshold, scores);
     for (int x = 0; x < image.width; ++x) {
       TEST_ASSERT_EQUAL_INT(opencv_scores[y][x] != 0, scores[x] != 0);
     }

@@ -146,7 +146,7 @@ double cosine(const uint8_t* a, const uint8_t* b) {
 
 void test_a_descriptor_turns_with_its_angle() {
   uint8_t upright[TV_DESCRIPTOR_BYTES], turned[TV_DESCRIPTOR_BYTES];
-  const tvk_table& kernels = *tvk_select(TV_KERNELS_AUTO);
+  const tvk_set& kernels = *tvk_select(TV_KERNELS_AUTO);
   render(0, texture);
   tv::describe_keypoints(kernels, octaves_of_pixels(), &middle, 1, TV_NORMALISATION_SIFT, 0,
                          upright);
@@ -171,7 +171,7 @@ void test_a_descriptor_turns_with_its_angle() {
 // row by row.
 void test_the_order_is_ubcs() {
   uint8_t descriptor[TV_DESCRIPTOR_BYTES];
-  const tvk_table& kernels = *tvk_select(TV_KERNELS_AUTO);
+  const tvk_set& kernels = *tvk_select(TV_KERNELS_AUTO);
   for (int direction = 0; direction < 8; ++direction) {
     // Brightness rises along `direction`, counter-clockwise as seen, in the lower right quarter
     // only.

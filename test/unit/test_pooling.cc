@@ -118,7 +118,7 @@ void add_window(const tv_keypoint& p, double size, double* histogram) {
 
 // The L2 distance of our descriptor (of length 512) from the definition's, pooled or not.
 double distance(const tv_keypoint& p, int32_t ours_pooled, bool pooled) {
-  const tvk_table& kernels = *tvk_select(TV_KERNELS_AUTO);
+  const tvk_set& kernels = *tvk_select(TV_KERNELS_AUTO);
   tv::Arena arena = tv::arena_over(arena_memory, sizeof arena_memory);
   const tv::OctaveRange range = tv::octave_range(&p, 1, ours_pooled);
   const tv::Octaves octaves = tv::make_octaves(kernels, tv_image{pixels, kSide, kSide, kSide},

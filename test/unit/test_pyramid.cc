@@ -46,7 +46,7 @@ tv::Level noise_image(uint64_t* seed, int width, int height, int stride) {
 // axis. Rounding the result adds 0.5.
 constexpr double kMaxAverageError = 2 * 255.0 / 256.0 + 0.5;
 
-void check_level(const tvk_table& kernels, uint64_t* seed, int width, int height, double factor) {
+void check_level(const tvk_set& kernels, uint64_t* seed, int width, int height, double factor) {
   tv::Arena arena = tv::arena_over(arena_memory, sizeof arena_memory);
   TEST_ASSERT_LESS_OR_EQUAL(sizeof arena_memory, tv::level_buffers_bytes(width, height));
   tv::LevelBuffers buffers = tv::alloc_level_buffers(arena, width, height);
@@ -81,7 +81,7 @@ void check_level(const tvk_table& kernels, uint64_t* seed, int width, int height
 void test_levels_are_area_averages() {
   uint64_t seed = 21;
   for (int set = TV_KERNELS_C; set <= TV_KERNELS_NEON; ++set) {
-    const tvk_table* kernels = tvk_select(set);
+    const tvk_set* kernels = tvk_select(set);
     if (kernels == nullptr) continue;
     for (float factor : {1.1f, 1.2f, 1.25f, 1.33333f, 1.41421f, 1.5f, 1.9f, 1.99999f, 2.0f}) {
       check_level(*kernels, &seed, 97, 63, factor);
@@ -109,7 +109,7 @@ void test_a_constant_image_stays_constant() {
       tv::Arena arena = tv::arena_over(arena_memory, sizeof arena_memory);
       tv::LevelBuffers buffers = tv::alloc_level_buffers(arena, 201, 155);
       tv::Level level{pixels, 201, 155, 211, 1.0};
-      const tvk_table& kernels = *tvk_select(TV_KERNELS_AUTO);
+      const tvk_set& kernels = *tvk_select(TV_KERNELS_AUTO);
       for (int k = 0; tv::next_level(kernels, level, factor, k, buffers, &level); ++k) {
         for (int p = 0; p < level.width * level.height; ++p) {
           TEST_ASSERT_EQUAL_INT(grey, level.data[p]);
@@ -132,7 +132,7 @@ void test_patches_are_bilinear_samples() {
   uint16_t pairs[kHeight * (kWidth + 1)];
   for (int y = 0; y < kHeight; ++y) {
     const uint8_t* row = image.data + y * kStride;
-    tvk_select(TV_KERNELS_AUTO)
+    tvk_describe_of(tvk_select(TV_KERNELS_AUTO))
         ->pair_rows(row, y + 1 < kHeight ? row + kStride : row, kWidth, pairs + y * (kWidth + 1));
   }
   double sum = 0;
@@ -141,7 +141,7 @@ void test_patches_are_bilinear_samples() {
     const int y = random_int(&seed, -10 * 65536, 37 * 65536);
     const int du_x = random_int(&seed, -70000, 70000), du_y = random_int(&seed, -70000, 70000);
     int16_t patch[kRows * kPatch + 1];
-    tvk_select(trial % 2 ? TV_KERNELS_AUTO : TV_KERNELS_C)
+    tvk_describe_of(tvk_select(trial % 2 ? TV_KERNELS_AUTO : TV_KERNELS_C))
         ->sample_patch(pairs, kWidth, kHeight, x, y, du_x, du_y, kRows, patch);
     for (int k = 0; k < kRows * kPatch; ++k) {
       const int i = k % kPatch, j = k / kPatch;

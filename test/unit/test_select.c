@@ -32,17 +32,17 @@ static void test_the_sets_are_those_that_the_compiler_finds(void) {
   size_t k;
   __builtin_cpu_init();
   for (k = 0; k < sizeof sets / sizeof sets[0]; ++k) {
-    const tvk_table *const table = tvk_nth(n);
+    const tvk_set *const table = tvk_nth(n);
     if (!has_instructions_of(sets[k])) continue;
     TEST_ASSERT_NOT_NULL(table);
-    TEST_ASSERT_EQUAL_INT(sets[k], table->set);
+    TEST_ASSERT_EQUAL_INT(sets[k], table->id);
     ++n;
   }
   TEST_ASSERT_NULL(tvk_nth(n));
 }
 
 static void test_the_fastest_is_that_of_the_cpu_named(void) {
-  TEST_ASSERT_EQUAL_INT(fastest_known, tvk_select(TV_KERNELS_AUTO)->set);
+  TEST_ASSERT_EQUAL_INT(fastest_known, tvk_select(TV_KERNELS_AUTO)->id);
 }
 
 int main(int argc, char **argv) {

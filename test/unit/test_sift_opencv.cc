@@ -61,7 +61,7 @@ void find_keypoints(int view) {
 }
 
 void describe_with_ours(int view) {
-  const tvk_table& kernels = *tvk_select(TV_KERNELS_AUTO);
+  const tvk_set& kernels = *tvk_select(TV_KERNELS_AUTO);
   tv::Arena arena = tv::arena_over(arena_memory, sizeof arena_memory);
   const tv::Octaves octaves = tv::make_octaves(kernels, image_of(view), 0, 0, arena);
   for (int k = 0; k < counts[view]; ++k) {

@@ -44,7 +44,7 @@ tv::Squeeze squeeze_of(const Shape& shape, int width, int height) {
 tv_image image_of(int width, int height) { return tv_image{pixels, width, height, kMaxSide}; }
 
 tv::Squeezed squeezed(const tv_image& image, const tv_image* mask, const tv::Squeeze& squeeze,
-                      const tvk_table* kernels = tvk_select(TV_KERNELS_C)) {
+                      const tvk_set* kernels = tvk_select(TV_KERNELS_C)) {
   const size_t bytes = tv::squeeze_bytes(squeeze, image.width);
   TEST_ASSERT_LESS_OR_EQUAL(sizeof arena_memory, bytes);
   tv::Arena arena = tv::arena_over(arena_memory, sizeof arena_memory);

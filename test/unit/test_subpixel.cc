@@ -57,7 +57,7 @@ bool find_corner(int arc, int* best_x, int* best_y) {
     const uint8_t* rows[7];
     uint8_t scores[kSide];
     for (int k = 0; k < 7; ++k) rows[k] = pixels + (y - 3 + k) * kSide;
-    tvk_select(TV_KERNELS_C)->fast_score_row(rows, kSide, arc, 1, scores);
+    tvk_detect_of(tvk_select(TV_KERNELS_C))->fast_score_row(rows, kSide, arc, 1, scores);
     for (int x = 3; x < kSide - 3; ++x) {
       if (scores[x] <= best) continue;
       best = scores[x];
@@ -73,7 +73,8 @@ void refine(int x, int y, double* rx, double* ry) {
   const uint8_t* const at = level.data + y * level.stride + x;
   const uint8_t* const centres[2] = {at, at};
   int32_t determinants[2 * TVK_HESSIAN_PLACES];
-  tvk_select(TV_KERNELS_AUTO)->hessian_determinants(centres, level.stride, determinants);
+  tvk_detect_of(tvk_select(TV_KERNELS_AUTO))
+      ->hessian_determinants(centres, level.stride, determinants);
   tv::find_peak(determinants, x, y, &peak);
   *rx = peak.x;
   *ry = peak.y;
@@ -176,10 +177,10 @@ void test_determinants_are_those_of_the_definition() {
       centres[n] = pixels + cy[n] * kSide + cx[n];
     }
     for (int set = TV_KERNELS_C; set <= TV_KERNELS_AVX512; ++set) {
-      const tvk_table* kernels = tvk_select(static_cast<tv_kernels>(set));
+      const tvk_set* kernels = tvk_select(static_cast<tv_kernels>(set));
       if (kernels == nullptr) continue;
       int32_t found[2][TVK_HESSIAN_PLACES];
-      kernels->hessian_determinants(centres, kSide, found[0]);
+      tvk_detect_of(kernels)->hessian_determinants(centres, kSide, found[0]);
       for (int k = 0; k < 2 * 49; ++k) {
         const int n = k / 49, row = k % 49 / 7, column = k % 7;
         const int64_t expected = determinant_at(cx[n] + column - 3, cy[n] + row - 3);

@@ -15,7 +15,7 @@ bool is_at_same_place(const tv_keypoint& a, const tv_keypoint& b) {
 // A corner with two directions has two keypoints in turn, and two corners may have two matches,
 // which are one to the estimate: the match of lower rank is aligned, and the other one moves with
 // it.
-void align_all(const tvk_table& kernels, const tv_image* const images[2], double size_of_one,
+void align_all(const tvk_set& set, const tv_image* const images[2], double size_of_one,
                tv_keypoint* const keypoints[2], const tv_correspondence* matches,
                int32_t num_matches, uint8_t* aligned) {
   for (int32_t k = 0; k < num_matches; ++k) {
@@ -31,7 +31,7 @@ void align_all(const tvk_table& kernels, const tv_image* const images[2], double
     }
     tv_keypoint& a = keypoints[0][m->idx0];
     tv_keypoint& b = keypoints[1][m->idx1];
-    aligned[k] = align_keypoints(kernels, *images[0], *images[1], size_of_one, &a, &b);
+    aligned[k] = align_keypoints(set, *images[0], *images[1], size_of_one, &a, &b);
     if (other == nullptr) continue;
     aligned[k - 1] = aligned[k];
     for (int v = 0; v < 2; ++v) {

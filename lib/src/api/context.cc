@@ -66,7 +66,7 @@ tv_status tv_context_init(tv_context** context, const tv_limits* limits, void* m
   if (context == nullptr || memory == nullptr) return TV_ERR_NULL;
   if (reinterpret_cast<uintptr_t>(memory) % TV_CONTEXT_ALIGNMENT != 0) return TV_ERR_ALIGNMENT;
   if (size_bytes < needed) return TV_ERR_MEMORY;
-  const tvk_table* kernels = tvk_select(read.kernels);
+  const tvk_set* kernels = tvk_select(read.kernels);
   if (kernels == nullptr) return TV_ERR_KERNELS;
   tv_context* made = static_cast<tv_context*>(memory);
   *made = tv_context{};
@@ -80,7 +80,7 @@ tv_status tv_context_init(tv_context** context, const tv_limits* limits, void* m
 }
 
 tv_kernels tv_context_kernels(const tv_context* context) {
-  return context == nullptr ? TV_KERNELS_AUTO : static_cast<tv_kernels>(context->kernels->set);
+  return context == nullptr ? TV_KERNELS_AUTO : static_cast<tv_kernels>(context->kernels->id);
 }
 
 size_t tv_context_high_water(const tv_context* context) {

@@ -8,7 +8,7 @@
 
 struct tv_context {
   tv_limits limits;  // max_matches and purposes are resolved, never 0; max_effort, too
-  const tvk_table* kernels;
+  const tvk_set* kernels;
   tv::Arena arena;  // scratch of the running call; after tv_reconstruct its front holds the results
   int32_t most_keypoints;  // of an image: those of the highest rung of effort
   tv_clock clock;

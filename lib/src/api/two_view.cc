@@ -433,7 +433,7 @@ tv_status tv_estimate_two_view(tv_context* context, const tv_camera* camera0,
       std::swap(o.focal_sigma0, o.focal_sigma1);
       std::swap(o.center_sigma0, o.center_sigma1);
     }
-    problem.kernels = context->kernels;
+    problem.kernels = tvk_geometry_of(context->kernels);
   }
   tv::TwoViewOutcome outcome{};
   int num_still = 0;

@@ -72,7 +72,7 @@ int32_t add_row(const Level& level, const tv_image* mask, int32_t border, int32_
 // Writes the corners of a level to work.candidates in raster order and returns their number. All
 // corners that can be among the `wanted` best are included. Once at least `wanted` corners score
 // above the threshold, the threshold rises by one for the rest of the image, up to `highest`.
-int32_t scan_level(const tvk_table& kernels, const Level& level, const tv_image* mask,
+int32_t scan_level(const tvk_detect_table& kernels, const Level& level, const tv_image* mask,
                    const tv_feature_options& options, int32_t threshold, int32_t highest,
                    int32_t wanted, Workspace& work, Histogram& histogram) {
   const int32_t rim = TVK_CIRCLE_RADIUS;
@@ -180,7 +180,7 @@ bool mark_pixel(uint32_t* marks, const Level& level, int32_t x, int32_t y) {
 // Makes keypoints from the corners of a level and returns their number. With subpixel positions,
 // two corners may move to the same maximum: the first one becomes a keypoint, the others do not. A
 // corner does not move to a pixel that is masked out.
-int32_t make_keypoints(const tvk_table& kernels, const Corner* corners, int32_t count,
+int32_t make_keypoints(const tvk_detect_table& kernels, const Corner* corners, int32_t count,
                        const Level& level, int32_t index, const tv_image* mask,
                        const tv_feature_options& options, uint32_t* marks, tv_keypoint* keypoints) {
   int32_t determinants[2][TVK_HESSIAN_PLACES];  // of corners k and k + 1, for even k
@@ -250,7 +250,7 @@ Workspace alloc_workspace(Arena& arena, int32_t width, int32_t height) {
 // number. *cutoff is the lowest score that counted on the level before, 0 for the first one: mostly
 // as many corners are above it here. Else the level is scanned a second time. It becomes that of
 // this level.
-int32_t collect_level(const tvk_table& kernels, const Level& level, const tv_image* mask,
+int32_t collect_level(const tvk_detect_table& kernels, const Level& level, const tv_image* mask,
                       const tv_feature_options& options, int32_t index, int32_t share,
                       int32_t* cutoff, Workspace& work, tv_keypoint* keypoints) {
   const int32_t lowest = options.min_threshold > 0 ? options.min_threshold : options.threshold;
@@ -282,7 +282,7 @@ size_t corners_bytes(int32_t max_width, int32_t max_height) {
          arena_bytes<uint32_t>(marks_count(max_width, max_height));
 }
 
-int32_t find_corners(const tvk_table& kernels, const tv_image& image, const tv_image* mask,
+int32_t find_corners(const tvk_set& set, const tv_image& image, const tv_image* mask,
                      const tv_feature_options& options, int32_t budget, Arena& arena,
                      tv_keypoint* keypoints) {
   ArenaScope scope(arena);
@@ -300,8 +300,9 @@ int32_t find_corners(const tvk_table& kernels, const tv_image& image, const tv_i
     for (int32_t j = k + 1; j < levels; ++j) promised += level_share(budget, j, levels, factor);
     share = std::max(share, budget - count - promised);
     share = std::min(share, budget - count);
-    count += collect_level(kernels, level, mask, options, k, share, &cutoff, work, found + count);
-    if (k + 1 < levels) next_level(kernels, level, factor, k, buffers, &level);
+    count += collect_level(*tvk_detect_of(&set), level, mask, options, k, share, &cutoff, work,
+                           found + count);
+    if (k + 1 < levels) next_level(set, level, factor, k, buffers, &level);
   }
   sort_keypoints(found, count, keypoints);
   return count;

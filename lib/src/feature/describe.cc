@@ -64,9 +64,9 @@ constexpr Direction kUpright = {1.0, 0.0};
 
 // Samples a square patch of side x side samples that is centred on the keypoint and whose x axis
 // has this direction, with the step of a keypoint of this size.
-void sample_around(const tvk_table& kernels, const Octaves& octaves, const tv_keypoint& keypoint,
-                   double size, Direction direction, double step_per_size, int32_t side,
-                   int16_t* patch) {
+void sample_around(const tvk_describe_table& kernels, const Octaves& octaves,
+                   const tv_keypoint& keypoint, double size, Direction direction,
+                   double step_per_size, int32_t side, int16_t* patch) {
   const Octave& octave = octave_for(octaves, size);
   const double wanted = size * step_per_size / octave.scale;
   const double step = wanted < kLargestStep ? wanted : kLargestStep;
@@ -100,8 +100,9 @@ Direction direction_of(float angle_rad) {
   return direction;
 }
 
-void histogram_of(const tvk_table& kernels, const Octaves& octaves, const tv_keypoint& keypoint,
-                  Direction direction, int32_t pooling, int32_t* histogram) {
+void histogram_of(const tvk_describe_table& kernels, const Octaves& octaves,
+                  const tv_keypoint& keypoint, Direction direction, int32_t pooling,
+                  int32_t* histogram) {
   constexpr int32_t kPatch = TVK_PATCH_SIDE * TVK_PATCH_SIDE;
   int16_t patches[2 * kPatch + 1];
   const int32_t num_patches = pooling != 0 ? 2 : 1;
@@ -139,8 +140,9 @@ OctaveRange octave_range(const tv_keypoint* keypoints, int32_t count, int32_t po
   return OctaveRange{octave_of(smallest), octave_of(largest)};
 }
 
-int32_t dominant_angles(const tvk_table& kernels, const Octaves& octaves,
-                        const tv_keypoint& keypoint, float angles_rad[2]) {
+int32_t dominant_angles(const tvk_set& set, const Octaves& octaves, const tv_keypoint& keypoint,
+                        float angles_rad[2]) {
+  const tvk_describe_table& kernels = *tvk_describe_of(&set);
   int16_t patch[TVK_ORIENT_SIDE * TVK_PATCH_SIDE + 1];
   int32_t smooth[TVK_ORIENT_BINS + 2], peaks[2];
   sample_around(kernels, octaves, keypoint, keypoint.size, kUpright, kOrientStep, TVK_ORIENT_SIDE,
@@ -155,9 +157,9 @@ int32_t dominant_angles(const tvk_table& kernels, const Octaves& octaves,
   return 2;
 }
 
-void describe_keypoints(const tvk_table& kernels, const Octaves& octaves,
-                        const tv_keypoint* keypoints, int32_t count, int32_t kind, int32_t pooling,
-                        uint8_t* descriptors) {
+void describe_keypoints(const tvk_set& set, const Octaves& octaves, const tv_keypoint* keypoints,
+                        int32_t count, int32_t kind, int32_t pooling, uint8_t* descriptors) {
+  const tvk_describe_table& kernels = *tvk_describe_of(&set);
   const int32_t root = kind == TV_NORMALISATION_ROOTSIFT;
   for (int32_t first = 0; first < count; first += kBlock) {
     const int32_t num = std::min(kBlock, count - first);

@@ -19,13 +19,12 @@ OctaveRange octave_range(const tv_keypoint* keypoints, int32_t count, int32_t po
 
 // Writes the angles of the one or two peaks of the gradient histogram, the highest first. Returns
 // how many.
-int32_t dominant_angles(const tvk_table& kernels, const Octaves& octaves,
-                        const tv_keypoint& keypoint, float angles_rad[2]);
+int32_t dominant_angles(const tvk_set& set, const Octaves& octaves, const tv_keypoint& keypoint,
+                        float angles_rad[2]);
 
 // Writes the descriptors, TV_DESCRIPTOR_BYTES bytes each. `kind` is a tv_normalisation; `pooling`
 // is as in tv_feature_options.
-void describe_keypoints(const tvk_table& kernels, const Octaves& octaves,
-                        const tv_keypoint* keypoints, int32_t count, int32_t kind, int32_t pooling,
-                        uint8_t* descriptors);
+void describe_keypoints(const tvk_set& set, const Octaves& octaves, const tv_keypoint* keypoints,
+                        int32_t count, int32_t kind, int32_t pooling, uint8_t* descriptors);
 
 }  // namespace tv

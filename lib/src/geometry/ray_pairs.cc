@@ -70,7 +70,7 @@ size_t ray_pairs_bytes(int max_matches) {
 
 RayPairs alloc_ray_pairs(Arena& arena, int max_matches, bool on_plane) {
   RayPairs pairs{};
-  pairs.kernels = tvk_select(TV_KERNELS_C);
+  pairs.kernels = tvk_geometry_of(tvk_select(TV_KERNELS_C));
   const size_t n = static_cast<size_t>(max_matches);
   pairs.on_plane = on_plane;
   for (int v = 0; v < 2; ++v) {

@@ -21,7 +21,7 @@ inline constexpr int kScoreBlock = TVK_SCORE_BLOCK;
 
 // A structure of arrays, component by component, so that a loop over matches can be vectorised.
 struct RayPairs {
-  const tvk_table* kernels;
+  const tvk_geometry_table* kernels;
   int num;
   bool on_plane;  // all rays have z = 1, so the third rows of the Jacobians are zero
   double* ray[2][3];

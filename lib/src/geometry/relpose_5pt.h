@@ -30,7 +30,7 @@ struct Essentials {
 };
 
 // All kSamples5 samples must be set, with finite rays; only the first num_samples are solved.
-void relpose_5pt(const tvk_table& kernels, const Samples5& samples, int num_samples,
+void relpose_5pt(const tvk_geometry_table& kernels, const Samples5& samples, int num_samples,
                  Essentials* models);
 
 // Like relpose_5pt above, for one sample and with the portable kernel. essentials has room for

@@ -157,7 +157,7 @@ bool kernel_leaves_some(tv_triangulation method, const TriangulationPair& pair,
                         const double* pixels0, const double* pixels1, size_t num,
                         tv_point* points) {
   constexpr size_t kAtOnce = size_t{1} << 30;  // matches a call: the kernel's count is an int32_t
-  const tvk_table* kernels = tvk_select(TV_KERNELS_AUTO);
+  const tvk_geometry_table* kernels = tvk_geometry_of(tvk_select(TV_KERNELS_AUTO));
   const tvk_triangulate_pair p = kernel_pair(pair);
   bool leaves = false;
   for (size_t first = 0; first < num; first += kAtOnce) {

@@ -29,7 +29,7 @@ Footprint footprint(int32_t x, double factor) {
   return f;
 }
 
-void halve(const tvk_table& kernels, const Level& source, uint8_t* pixels, int32_t width,
+void halve(const tvk_detect_table& kernels, const Level& source, uint8_t* pixels, int32_t width,
            int32_t height) {
   for (int32_t y = 0; y < height; ++y) {
     const uint8_t* row = source.data + 2 * y * source.stride;
@@ -63,8 +63,8 @@ void plan_columns(int32_t source_width, double factor, int32_t width, tvk_column
   }
 }
 
-void average(const tvk_table& kernels, const Level& source, double factor, LevelBuffers& buffers,
-             uint8_t* pixels, int32_t width, int32_t height) {
+void average(const tvk_detect_table& kernels, const Level& source, double factor,
+             LevelBuffers& buffers, uint8_t* pixels, int32_t width, int32_t height) {
   plan_columns(source.width, factor, width, buffers.columns);
   int32_t made = 0;  // the rows of `source` whose columns are averaged
   for (int32_t y = 0; y < height; ++y) {
@@ -83,7 +83,8 @@ void average(const tvk_table& kernels, const Level& source, double factor, Level
 }
 
 // Blurs the level and writes the blurred rows in pairs. `rows` is scratch for two blurred rows.
-void make_octave(const tvk_table& kernels, const Level& source, uint8_t* rows[2], uint16_t* pairs) {
+void make_octave(const tvk_describe_table& kernels, const Level& source, uint8_t* rows[2],
+                 uint16_t* pairs) {
   const int32_t last = source.height - 1;
   for (int32_t y = 0; y <= last; ++y) {
     const uint8_t* row = source.data + y * source.stride;
@@ -122,11 +123,12 @@ LevelBuffers alloc_level_buffers(Arena& arena, int32_t max_width, int32_t max_he
   return buffers;
 }
 
-bool next_level(const tvk_table& kernels, const Level& level, double factor, int32_t index,
+bool next_level(const tvk_set& set, const Level& level, double factor, int32_t index,
                 LevelBuffers& buffers, Level* next) {
   const int32_t width = static_cast<int32_t>(level.width / factor);
   const int32_t height = static_cast<int32_t>(level.height / factor);
   if (width < kMinLevelSide || height < kMinLevelSide) return false;
+  const tvk_detect_table& kernels = *tvk_detect_of(&set);
   uint8_t* pixels = buffers.pixels[index & 1];
   if (factor == 2.0) {
     halve(kernels, level, pixels, width, height);
@@ -149,7 +151,7 @@ size_t octaves_bytes(int32_t max_width, int32_t max_height) {
   return bytes;
 }
 
-Octaves make_octaves(const tvk_table& kernels, const tv_image& image, int32_t first, int32_t last,
+Octaves make_octaves(const tvk_set& set, const tv_image& image, int32_t first, int32_t last,
                      Arena& arena) {
   Octaves octaves{};
   Level level = full_level(image);
@@ -160,13 +162,13 @@ Octaves make_octaves(const tvk_table& kernels, const tv_image& image, int32_t fi
     const bool is_coarsest = o >= last || width < kMinLevelSide || height < kMinLevelSide;
     if (o >= first || is_coarsest) {
       uint16_t* pairs = arena_alloc<uint16_t>(arena, area(level.width + 1, level.height));
-      make_octave(kernels, level, rows, pairs);
+      make_octave(*tvk_describe_of(&set), level, rows, pairs);
       octaves.octaves[o] = Octave{pairs, level.width, level.height, level.scale};
     }
     octaves.count = o + 1;
     if (is_coarsest) break;
     uint8_t* halved = arena_alloc<uint8_t>(arena, area(width, height));
-    halve(kernels, level, halved, width, height);
+    halve(*tvk_detect_of(&set), level, halved, width, height);
     level = Level{halved, width, height, width, level.scale * 2};
   }
   return octaves;

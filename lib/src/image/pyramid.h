@@ -47,7 +47,7 @@ LevelBuffers alloc_level_buffers(Arena& arena, int32_t max_width, int32_t max_he
 // Makes the next smaller level by averaging factor x factor pixels for each of its pixels, factor
 // in (1, 2]. Returns false, and makes nothing, when a side would be shorter than kMinLevelSide.
 // `index` is the number of levels made so far; it selects the buffer.
-bool next_level(const tvk_table& kernels, const Level& level, double factor, int32_t index,
+bool next_level(const tvk_set& set, const Level& level, double factor, int32_t index,
                 LevelBuffers& buffers, Level* next);
 
 // The image halved zero or more times and blurred by the 3x3 binomial filter. Its rows are stored
@@ -70,7 +70,7 @@ size_t octaves_bytes(int32_t max_width, int32_t max_height);
 // Makes the octaves `first` to `last`; those before `first` are left unfilled. `count` is last + 1,
 // or less where the image is too small for `last` (kMinLevelSide) or `last` is not below
 // kMaxOctaves. The octave count - 1 is always filled, even if it comes before `first`.
-Octaves make_octaves(const tvk_table& kernels, const tv_image& image, int32_t first, int32_t last,
+Octaves make_octaves(const tvk_set& set, const tv_image& image, int32_t first, int32_t last,
                      Arena& arena);
 
 }  // namespace tv

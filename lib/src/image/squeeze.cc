@@ -93,10 +93,11 @@ size_t squeeze_bytes(const Squeeze& s, int32_t width) {
          kRows * arena_bytes<uint16_t>(columns) + arena_bytes<uint32_t>(static_cast<size_t>(width));
 }
 
-Squeezed squeeze_image(const tvk_table& kernels, const tv_image& image, const tv_image* mask,
+Squeezed squeeze_image(const tvk_set& set, const tv_image& image, const tv_image* mask,
                        const Squeeze& s, Arena& arena) {
   const size_t columns = static_cast<size_t>(s.width);
   const size_t pixels = columns * static_cast<size_t>(s.height);
+  const tvk_squeeze_table& kernels = *tvk_squeeze_of(&set);
   uint8_t* const squeezed = arena_alloc<uint8_t>(arena, pixels);
   uint8_t* const masked = arena_alloc<uint8_t>(arena, pixels);
   ArenaScope scope(arena);

@@ -37,7 +37,7 @@ inline constexpr int32_t kSqueezeMargin = 4;
 struct Squeezed {
   tv_image image, mask;
 };
-Squeezed squeeze_image(const tvk_table& kernels, const tv_image& image, const tv_image* mask,
+Squeezed squeeze_image(const tvk_set& set, const tv_image& image, const tv_image* mask,
                        const Squeeze& squeeze, Arena& arena);
 
 // The most bytes that squeeze_image takes for an image of this size.

@@ -205,8 +205,8 @@ typedef struct tvk_dense_table {
 #undef TVK_MEMBER
 } tvk_dense_table;
 
-/* Those that belong to a table of kernels.h. */
-const tvk_dense_table *tvk_dense_of(const tvk_table *kernels);
+/* Those of a set. */
+const tvk_dense_table *tvk_dense_of(const tvk_set *set);
 
 #ifdef __cplusplus
 }

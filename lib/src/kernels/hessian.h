@@ -1,9 +1,45 @@
 /* The kernel hessian_determinants. All values fit 16 bits but for the determinants themselves,
-   which fit 32: smoothed pixels are at most 4080, second derivatives at most 32640. The rows of
-   pixels are read once, in order: what later rows need of earlier ones is kept in registers. A
-   group of eight lanes holds pixels of one centre; AVX2 has two groups and does both centres at
-   once. */
+   which fit 32: smoothed pixels are at most 4080, second derivatives at most 32640. */
 
+#if !defined(__SSE2__) && !defined(__ARM_NEON)
+/* Without vectors: the definition as it is written in kernels.h. */
+static void hessian_determinants(const uint8_t *const centres[2], int64_t stride,
+                                 int32_t *determinants) {
+  enum { SIDE = 9, PIXELS = 2 * TVK_HESSIAN_REACH + 1 };
+  int32_t k, x, y;
+  for (k = 0; k < 2; ++k, determinants += TVK_HESSIAN_PLACES) {
+    const uint8_t *row = centres[k] - TVK_HESSIAN_REACH * (stride + 1);
+    int32_t along[PIXELS][SIDE], smooth[SIDE][SIDE]; /* smoothed along x, and along y as well */
+    for (y = 0; y < PIXELS; ++y, row += stride) {
+      for (x = 0; x < SIDE; ++x) {
+        const uint8_t *p = row + x;
+        along[y][x] = p[0] + p[4] + 4 * (p[1] + p[3]) + 6 * p[2];
+      }
+    }
+    for (y = 0; y < SIDE; ++y) {
+      for (x = 0; x < SIDE; ++x) {
+        smooth[y][x] = (along[y][x] + along[y + 4][x] + 4 * (along[y + 1][x] + along[y + 3][x]) +
+                        6 * along[y + 2][x] + 8) >>
+                       4;
+      }
+    }
+    for (y = 1; y < SIDE - 1; ++y) {
+      for (x = 1; x < SIDE - 1; ++x) {
+        const int32_t *above = &smooth[y - 1][x], *at = &smooth[y][x], *below = &smooth[y + 1][x];
+        const int32_t corners = above[-1] + above[1] + below[-1] + below[1];
+        const int32_t beside = at[-1] + at[1], upright = above[0] + below[0];
+        const int32_t xx = corners + 2 * (beside - upright) - 4 * at[0];
+        const int32_t yy = corners + 2 * (upright - beside) - 4 * at[0];
+        const int32_t xy = below[1] - below[-1] - above[1] + above[-1];
+        determinants[8 * (y - 1) + x - 1] = xx * yy - xy * xy;
+      }
+    }
+  }
+}
+#else
+/* The rows of pixels are read once, in order: what later rows need of earlier ones is kept in
+   registers. A group of eight lanes holds pixels of one centre; AVX2 has two groups and does both
+   centres at once. */
 #if defined(TVK_AVX2) || defined(TVK_AVX512)
 enum { HESSIAN_CENTRES = 2 };
 #else
@@ -27,14 +63,6 @@ typedef uint16_t unsigned_eights __attribute__((vector_size(16 * HESSIAN_CENTRES
                                  _mm_slli_si128((__m128i)(b), 16 - 2 * (n))))
 #elif defined(__ARM_NEON)
 #define EIGHTS_AFTER(a, b, n) ((unsigned_eights)vextq_u16((uint16x8_t)(a), (uint16x8_t)(b), n))
-#else
-static inline unsigned_eights eights_after(unsigned_eights a, unsigned_eights b, int n) {
-  unsigned_eights after;
-  int k;
-  for (k = 0; k < 8; ++k) after[k] = k + n < 8 ? a[k + n] : b[k + n - 8];
-  return after;
-}
-#define EIGHTS_AFTER(a, b, n) eights_after((unsigned_eights)(a), (unsigned_eights)(b), n)
 #endif
 
 /* The eight bytes `offset` after each of the places. */
@@ -47,10 +75,7 @@ static inline unsigned_eights load_eights(const uint8_t *const *places, int64_t 
   const __m128i bytes = _mm_loadl_epi64((const __m128i *)(places[0] + offset));
   return (unsigned_eights)_mm_unpacklo_epi8(bytes, _mm_setzero_si128());
 #else
-  typedef uint8_t eight_bytes __attribute__((vector_size(8)));
-  eight_bytes bytes;
-  memcpy(&bytes, places[0] + offset, sizeof bytes);
-  return __builtin_convertvector(bytes, unsigned_eights);
+  return (unsigned_eights)vmovl_u8(vld1_u8(places[0] + offset));
 #endif
 }
 
@@ -81,6 +106,11 @@ static inline void store_determinants(eights xx, eights yy, eights xy, int32_t *
   _mm256_storeu_si256((__m256i *)out, _mm256_permute2x128_si256(low, high, 0x20));
   _mm256_storeu_si256((__m256i *)(out + TVK_HESSIAN_PLACES),
                       _mm256_permute2x128_si256(low, high, 0x31));
+#elif defined(__ARM_NEON)
+  const int16x8_t a = (int16x8_t)xx, b = (int16x8_t)yy, c = (int16x8_t)xy;
+  const int16x4_t low = vget_low_s16(c), high = vget_high_s16(c);
+  vst1q_s32(out, vmlsl_s16(vmull_s16(vget_low_s16(a), vget_low_s16(b)), low, low));
+  vst1q_s32(out + 4, vmlsl_s16(vmull_s16(vget_high_s16(a), vget_high_s16(b)), high, high));
 #else
   int k;
   for (k = 0; k < 8; ++k) out[k] = xx[k] * yy[k] - xy[k] * xy[k];
@@ -129,3 +159,4 @@ static void hessian_determinants(const uint8_t *const centres[2], int64_t stride
     determinants_around(centres + k, stride, determinants + k * TVK_HESSIAN_PLACES);
   }
 }
+#endif

@@ -1,10 +1,10 @@
 /* The kernels: the inner loops over pixels, patches, descriptors and matches.
 
-   TVK_LIST names each kernel once. The function tables, the declarations and the checker
-   (test/kernel) all come from it. The C files are the definition: they use integer arithmetic, or
-   single IEEE operations in a written order, so that every set gives the same bytes. A set is the
-   same source compiled for another instruction set, with intrinsics only where they were measured
-   to be faster. */
+   The lists of TVK_PARTS name each kernel once. The function tables, the declarations and the
+   checker (test/kernel) all come from them. The C files are the definition: they use integer
+   arithmetic, or single IEEE operations in a written order, so that every set gives the same bytes.
+   A set is the same source compiled for another instruction set, with intrinsics only where they
+   were measured to be faster. */
 #ifndef TWOVIEW_KERNELS_H
 #define TWOVIEW_KERNELS_H
 
@@ -257,25 +257,29 @@ typedef struct tvk_triangulate_pair {
    (`method`, a tv_triangulation). A pixel is two numbers, x and y. A match whose point is neither
    TV_POINT_OK nor TV_POINT_BEHIND, or that needs more care, gets status -1 and zeros; the caller
    solves it by geometry/triangulation.cc. Returns whether there is such a match. */
-#define TVK_PIXEL_LIST(X)                                                                          \
-  X(fast_score_row, void,                                                                          \
-    (const uint8_t *const rows[7], int32_t width, int32_t arc, int32_t threshold,                  \
-     uint8_t *scores))                                                                             \
-  X(hessian_determinants, void,                                                                    \
-    (const uint8_t *const centres[2], int64_t stride, int32_t *determinants))                      \
-  X(suppress_row, int32_t,                                                                         \
-    (const uint8_t *prev, const uint8_t *cur, const uint8_t *next, int32_t width, uint16_t *xs))   \
-  X(average_columns, void,                                                                         \
-    (const uint8_t *row, const tvk_columns *columns, int32_t out_width, uint16_t *sums))           \
-  X(average_rows, void,                                                                            \
-    (const uint16_t *const rows[3], const int32_t row_weights[3], int32_t width, uint8_t *out))    \
+#define TVK_DETECT_LIST(X)                                                                       \
+  X(fast_score_row, void,                                                                        \
+    (const uint8_t *const rows[7], int32_t width, int32_t arc, int32_t threshold,                \
+     uint8_t *scores))                                                                           \
+  X(hessian_determinants, void,                                                                  \
+    (const uint8_t *const centres[2], int64_t stride, int32_t *determinants))                    \
+  X(suppress_row, int32_t,                                                                       \
+    (const uint8_t *prev, const uint8_t *cur, const uint8_t *next, int32_t width, uint16_t *xs)) \
+  X(average_columns, void,                                                                       \
+    (const uint8_t *row, const tvk_columns *columns, int32_t out_width, uint16_t *sums))         \
+  X(average_rows, void,                                                                          \
+    (const uint16_t *const rows[3], const int32_t row_weights[3], int32_t width, uint8_t *out))  \
+  X(halve_row, void, (const uint8_t *a, const uint8_t *b, int32_t out_width, uint8_t *out))
+
+#define TVK_SQUEEZE_LIST(X)                                                                        \
   X(squeeze_row, void,                                                                             \
     (const uint8_t *row, int32_t width, int64_t begin, int32_t step, int32_t out_width,            \
      uint32_t *sums, uint16_t *out))                                                               \
   X(mix_rows, void,                                                                                \
     (const uint16_t *const rows[TVK_MIX_ROWS], const int32_t weights[TVK_MIX_ROWS], int32_t width, \
-     uint8_t *out))                                                                                \
-  X(halve_row, void, (const uint8_t *a, const uint8_t *b, int32_t out_width, uint8_t *out))        \
+     uint8_t *out))
+
+#define TVK_DESCRIBE_LIST(X)                                                                       \
   X(blur_row, void,                                                                                \
     (const uint8_t *above, const uint8_t *row, const uint8_t *below, int32_t width, uint8_t *out)) \
   X(pair_rows, void, (const uint8_t *row, const uint8_t *below, int32_t width, uint16_t *pairs))   \
@@ -285,23 +289,27 @@ typedef struct tvk_triangulate_pair {
   X(orientation_histogram, void, (const int16_t *patch, int32_t *histogram, int32_t peaks[2]))     \
   X(gradient_histogram, void, (const int16_t *patches, int32_t num_patches, int32_t *histogram))   \
   X(quantize_descriptors, void,                                                                    \
-    (const int32_t *histograms, int32_t count, int32_t root, uint8_t *descriptors))                \
-  X(window_template, void,                                                                         \
-    (const uint8_t *pixels, int64_t stride, int32_t width, int32_t x, int32_t y, int32_t step,     \
-     int16_t *channels, int32_t *products))                                                        \
-  X(window_sums, void,                                                                             \
-    (const uint8_t *pixels, int64_t stride, int32_t x, int32_t y, const int32_t map[4],            \
-     const int16_t *channels, int32_t *sums))                                                      \
-  X(nearest_groups, tvk_nearest_shape,                                                             \
-    (const tvk_descriptors *rows, const tvk_descriptors *columns, void *scratch,                   \
-     tvk_nearest_lists *of_columns, tvk_nearest *of_rows))                                         \
-  X(squared_distances, void,                                                                       \
-    (const uint8_t *query, const uint8_t *rows, const int32_t *indices, int32_t count,             \
+    (const int32_t *histograms, int32_t count, int32_t root, uint8_t *descriptors))
+
+#define TVK_ALIGN_LIST(X)                                                                      \
+  X(window_template, void,                                                                     \
+    (const uint8_t *pixels, int64_t stride, int32_t width, int32_t x, int32_t y, int32_t step, \
+     int16_t *channels, int32_t *products))                                                    \
+  X(window_sums, void,                                                                         \
+    (const uint8_t *pixels, int64_t stride, int32_t x, int32_t y, const int32_t map[4],        \
+     const int16_t *channels, int32_t *sums))
+
+#define TVK_MATCH_LIST(X)                                                              \
+  X(nearest_groups, tvk_nearest_shape,                                                 \
+    (const tvk_descriptors *rows, const tvk_descriptors *columns, void *scratch,       \
+     tvk_nearest_lists *of_columns, tvk_nearest *of_rows))                             \
+  X(squared_distances, void,                                                           \
+    (const uint8_t *query, const uint8_t *rows, const int32_t *indices, int32_t count, \
      int32_t *out))
 
 /* The kernels on matches. They are in files of their own (lanes_*.c), so that a set may use another
    set's. */
-#define TVK_MATCH_LIST(X)                                                                   \
+#define TVK_GEOMETRY_LIST(X)                                                                \
   X(sampson_squares, void,                                                                  \
     (const double *const *arrays, const int32_t *indices, int32_t first, int32_t count,     \
      int32_t on_plane, const double *m, double *squares))                                   \
@@ -326,23 +334,45 @@ typedef struct tvk_triangulate_pair {
     (const tvk_triangulate_pair *pair, int32_t method, const double *pixels0,               \
      const double *pixels1, int32_t count, struct tv_point *points))
 
-#define TVK_LIST(X) TVK_PIXEL_LIST(X) TVK_MATCH_LIST(X)
+/* The parts that the kernels belong to, each with a table of its own, so that a linker that drops
+   unused sections (--gc-sections) leaves out those of the parts that a program does not call. */
+#define TVK_PIXEL_PARTS(X)       \
+  X(detect, TVK_DETECT_LIST)     \
+  X(squeeze, TVK_SQUEEZE_LIST)   \
+  X(describe, TVK_DESCRIBE_LIST) \
+  X(align, TVK_ALIGN_LIST)       \
+  X(match, TVK_MATCH_LIST)
+#define TVK_PARTS(X) TVK_PIXEL_PARTS(X) X(geometry, TVK_GEOMETRY_LIST)
+/* All their kernels. */
+#define TVK_LIST(X)  \
+  TVK_DETECT_LIST(X) \
+  TVK_SQUEEZE_LIST(X) TVK_DESCRIBE_LIST(X) TVK_ALIGN_LIST(X) TVK_MATCH_LIST(X) TVK_GEOMETRY_LIST(X)
 
-typedef struct tvk_table {
-  int32_t set; /* the tv_kernels value of the set */
+/* A kernel set that this build has and this CPU can run. */
+typedef struct tvk_set {
+  int32_t id;    /* its tv_kernels value */
+  int32_t index; /* of its tables among those of this build */
+} tvk_set;
+
+/* The table of each part: tvk_detect_of returns that of the kernels for tv_detect, and so on. */
 #define TVK_MEMBER(name, result, parameters) result(*name) parameters;
-  TVK_LIST(TVK_MEMBER)
+#define TVK_DECLARE_PART(part, LIST)  \
+  typedef struct tvk_##part##_table { \
+    LIST(TVK_MEMBER)                  \
+  } tvk_##part##_table;               \
+  const tvk_##part##_table *tvk_##part##_of(const tvk_set *set);
+TVK_PARTS(TVK_DECLARE_PART)
+#undef TVK_DECLARE_PART
 #undef TVK_MEMBER
-} tvk_table;
 
-/* The tables that this build has and this CPU can run, for n = 0, 1, .. in order from the C set to
-   the fastest, then null. The NEON set has two tables on CPUs with ARMv8.2's dot product: one
-   without it, then one with it. */
-const tvk_table *tvk_nth(int32_t n);
+/* The sets that this build has and this CPU can run, for n = 0, 1, .. in order from the C set to
+   the fastest, then null. The NEON set is there twice on CPUs with ARMv8.2's dot product: without
+   it, then with it. */
+const tvk_set *tvk_nth(int32_t n);
 
-/* The fastest table of the set `set` (a tv_kernels), or of all sets for TV_KERNELS_AUTO. Null if
+/* The fastest set of the value `id` (a tv_kernels), or of all sets for TV_KERNELS_AUTO. Null if
    this build or this CPU has none. */
-const tvk_table *tvk_select(int32_t set);
+const tvk_set *tvk_select(int32_t id);
 
 #ifdef __cplusplus
 }

@@ -1,9 +1,7 @@
 /* The AVX2 set: the common source compiled for AVX2, with intrinsics where they were measured to be
    faster. FMA is not used, because it rounds differently. */
-#define TVK_SET TV_KERNELS_AVX2
-#define TVK_TABLE tvk_table_avx2
+#define TVK_TABLE(part) tvk_##part##_avx2
 #define TVK_AVX2
-#define TVK_MATCH(name) tvk_##name##_avx2
 #include "kernels/kernels_impl.h"
 
 TVK_LEND(hessian_determinants, avx2);

@@ -1,15 +1,8 @@
 /* The AVX-512 set: the common source compiled for AVX-512 with VNNI, with intrinsics where they
    were measured to be faster. */
-#define TVK_SET TV_KERNELS_AVX512
-#define TVK_TABLE tvk_table_avx512
+#define TVK_TABLE(part) tvk_##part##_avx512
 #define TVK_AVX512
-#define TVK_MATCH(name) tvk_##name##_avx512
 #include "kernels/kernels_impl.h"
-
-/* The transfer kernels are AVX2's. Only homographies and rotations, the rivals of the epipolar
-   model, use them: a hundredth of the time of an estimate. */
-#define tvk_transfer_squares_avx512 tvk_transfer_squares_avx2
-#define tvk_transfer_sums_avx512 tvk_transfer_sums_avx2
 
 /* These kernels are other sets', which are as fast, or whose difference does not show in the time
    of a pair. */

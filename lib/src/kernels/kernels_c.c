@@ -1,7 +1,6 @@
 /* The C set, which is portable and the definition of every kernel on pixels, patches and
    descriptors. */
-#define TVK_SET TV_KERNELS_C
-#define TVK_TABLE tvk_table_c
+#define TVK_TABLE(part) tvk_##part##_c
 #include "kernels/kernels_impl.h"
 
 #if defined(__x86_64__)

@@ -1,13 +1,12 @@
-/* The body of a kernel set's file. Define TVK_SET (a tv_kernels), TVK_TABLE (the name of the table)
-   and, unless the set uses the portable kernels on matches, TVK_MATCH(name) (the names of its own);
-   then include this file and after it kernels/kernels_table.h. Between the two a set may #define
-   one of its kernels as another set's that is as fast; its own is then not compiled. */
+/* The body of a set's file of the kernels on pixels, patches and descriptors. Define
+   TVK_TABLE(part), the name of a part's table; then include this file and after it
+   kernels/kernels_table.h. Between the two a set may #define one of its kernels as another set's
+   that is as fast; its own is then not compiled. */
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
 
 #include "kernels/kernels.h"
-#include "twoview/context.h"
 
 #pragma GCC diagnostic ignored "-Wunused-function" /* kernels replaced by another set's */
 

@@ -1,7 +1,6 @@
 /* The SSE2 set: the common source compiled for speed, where the C set is compiled for size, with
    intrinsics where they were measured to be faster. */
-#define TVK_SET TV_KERNELS_SSE2
-#define TVK_TABLE tvk_table_sse2
+#define TVK_TABLE(part) tvk_##part##_sse2
 #define TVK_SSE2
 #include "kernels/kernels_impl.h"
 

@@ -1,3 +1,4 @@
 /* The portable kernels on matches: the definition. */
-#define TVK_MATCH(name) tvk_##name##_c
+#define TVK_GEOMETRY(name) tvk_##name##_c
+#define TVK_GEOMETRY_TABLE tvk_geometry_c
 #include "kernels/lanes_impl.h"

@@ -59,8 +59,8 @@ typedef struct tvk_odometry_table {
 #undef TVK_MEMBER
 } tvk_odometry_table;
 
-/* Those that belong to a table of kernels.h. */
-const tvk_odometry_table *tvk_odometry_of(const tvk_table *kernels);
+/* Those of a set. */
+const tvk_odometry_table *tvk_odometry_of(const tvk_set *set);
 
 #ifdef __cplusplus
 }

@@ -605,8 +605,8 @@ static void solve_lanes(const double *rays, int first, double *essentials, int32
   write_models(rays, first, (const lanes(*)[4])e, &b, ok, essentials, counts);
 }
 
-void TVK_MATCH(relpose_5pt)(const double *rays, int32_t num_samples, double *essentials,
-                            int32_t *counts) {
+void TVK_GEOMETRY(relpose_5pt)(const double *rays, int32_t num_samples, double *essentials,
+                               int32_t *counts) {
   int first;
   for (first = 0; first < num_samples; first += TVK_LANES) {
     solve_lanes(rays, first, essentials, counts);

@@ -47,8 +47,9 @@ static TVK_INLINE void squares_of(const double *const *arrays, const int32_t *in
   }
 }
 
-void TVK_MATCH(sampson_squares)(const double *const *arrays, const int32_t *indices, int32_t first,
-                                int32_t count, int32_t on_plane, const double *m, double *squares) {
+void TVK_GEOMETRY(sampson_squares)(const double *const *arrays, const int32_t *indices,
+                                   int32_t first, int32_t count, int32_t on_plane, const double *m,
+                                   double *squares) {
   if (on_plane) {
     squares_of(arrays, indices, first, count, 1, m, squares);
   } else {
@@ -103,8 +104,9 @@ static TVK_INLINE void pose_squares_of(const double *const *arrays, int32_t firs
   }
 }
 
-void TVK_MATCH(pose_squares)(const double *const *arrays, int32_t first, int32_t count,
-                             int32_t on_plane, const double *pose, double scale, double *squares) {
+void TVK_GEOMETRY(pose_squares)(const double *const *arrays, int32_t first, int32_t count,
+                                int32_t on_plane, const double *pose, double scale,
+                                double *squares) {
   if (on_plane) {
     pose_squares_of(arrays, first, count, 1, pose, scale, squares);
   } else {
@@ -182,9 +184,9 @@ static TVK_INLINE void sums_of(const double *const *arrays, const int32_t *indic
   }
 }
 
-void TVK_MATCH(sampson_sums)(const double *const *arrays, const int32_t *indices, int32_t first,
-                             int32_t count, int32_t on_plane, const double *m, double inverse_sq,
-                             int32_t cauchy, double *sums) {
+void TVK_GEOMETRY(sampson_sums)(const double *const *arrays, const int32_t *indices, int32_t first,
+                                int32_t count, int32_t on_plane, const double *m, double inverse_sq,
+                                int32_t cauchy, double *sums) {
   if (on_plane) {
     sums_of(arrays, indices, first, count, 1, m, inverse_sq, cauchy, sums);
   } else {
@@ -263,9 +265,9 @@ static inline int64_t score_on_sphere(const float *const *arrays, int32_t first_
   return sum;
 }
 
-int64_t TVK_MATCH(sampson_score)(const float *const *arrays, int32_t first_block,
-                                 int32_t num_blocks, int32_t on_plane, const float *m,
-                                 float inverse_sq) {
+int64_t TVK_GEOMETRY(sampson_score)(const float *const *arrays, int32_t first_block,
+                                    int32_t num_blocks, int32_t on_plane, const float *m,
+                                    float inverse_sq) {
   int64_t sum = 0;
   int32_t k;
   if (!on_plane) {

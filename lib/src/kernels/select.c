@@ -1,4 +1,5 @@
-/* Lists the kernel sets that this build has and this CPU can run, and selects one of them. */
+/* Lists the kernel sets that this build has and this CPU can run, selects one of them, and finds
+   the tables of its parts. */
 #include <stddef.h>
 
 #include "kernels/kernels.h"
@@ -11,11 +12,6 @@
 #include <asm/hwcap.h>
 #include <sys/auxv.h>
 #endif
-
-extern const tvk_table tvk_table_c, tvk_table_sse2, tvk_table_avx2, tvk_table_avx512;
-extern const tvk_table tvk_table_neon, tvk_table_neon_dot;
-
-enum { MAX_TABLES = 4 };
 
 #if defined(__x86_64__)
 enum { LEVEL_SSE2, LEVEL_AVX2, LEVEL_AVX512 };
@@ -56,44 +52,52 @@ static int32_t cpu_level(void) __attribute__((ifunc("resolve_level")));
 static int32_t cpu_level(void) { return ask_cpu(); }
 #endif
 
-static int32_t tables_above_c(const tvk_table *tables[]) {
-  const int32_t level = cpu_level();
-  int32_t n = 0;
-  tables[n++] = &tvk_table_sse2;
-  if (level >= LEVEL_AVX2) tables[n++] = &tvk_table_avx2;
-  if (level >= LEVEL_AVX512) tables[n++] = &tvk_table_avx512;
-  return n;
-}
+/* TVK_SETS names the sets of this build, which `sets` lists in the same order. num_above_c returns
+   how many of those after the C set this CPU can run. A set without a table of its own for a part
+   has another's. */
+#define TVK_SETS(X, part) X(part, c) X(part, sse2) X(part, avx2) X(part, avx512)
+#define tvk_geometry_sse2 tvk_geometry_c
+static const tvk_set sets[] = {
+    {TV_KERNELS_C, 0}, {TV_KERNELS_SSE2, 1}, {TV_KERNELS_AVX2, 2}, {TV_KERNELS_AVX512, 3}};
+static int32_t num_above_c(void) { return 1 + cpu_level(); }
 #elif defined(__linux__) && defined(__aarch64__)
-static int32_t tables_above_c(const tvk_table *tables[]) {
-  int32_t n = 0;
-  tables[n++] = &tvk_table_neon;
-  if (getauxval(AT_HWCAP) & HWCAP_ASIMDDP) tables[n++] = &tvk_table_neon_dot;
-  return n;
-}
+#define TVK_SETS(X, part) X(part, c) X(part, neon) X(part, neon_dot)
+#define tvk_detect_neon_dot tvk_detect_neon
+#define tvk_squeeze_neon_dot tvk_squeeze_neon
+#define tvk_describe_neon_dot tvk_describe_neon
+#define tvk_align_neon_dot tvk_align_neon
+#define tvk_geometry_neon tvk_geometry_c
+#define tvk_geometry_neon_dot tvk_geometry_c
+static const tvk_set sets[] = {{TV_KERNELS_C, 0}, {TV_KERNELS_NEON, 1}, {TV_KERNELS_NEON, 2}};
+static int32_t num_above_c(void) { return getauxval(AT_HWCAP) & HWCAP_ASIMDDP ? 2 : 1; }
 #elif defined(__linux__) && defined(__arm__)
-static int32_t tables_above_c(const tvk_table *tables[]) {
-  tables[0] = &tvk_table_neon;
-  return (getauxval(AT_HWCAP) & HWCAP_NEON) != 0;
-}
+#define TVK_SETS(X, part) X(part, c) X(part, neon)
+#define tvk_geometry_neon tvk_geometry_c
+static const tvk_set sets[] = {{TV_KERNELS_C, 0}, {TV_KERNELS_NEON, 1}};
+static int32_t num_above_c(void) { return (getauxval(AT_HWCAP) & HWCAP_NEON) != 0; }
 #else
-static int32_t tables_above_c(const tvk_table *tables[]) {
-  (void)tables;
-  return 0;
-}
+#define TVK_SETS(X, part) X(part, c)
+static const tvk_set sets[] = {{TV_KERNELS_C, 0}};
+static int32_t num_above_c(void) { return 0; }
 #endif
 
-const tvk_table *tvk_nth(int32_t n) {
-  const tvk_table *tables[MAX_TABLES] = {&tvk_table_c};
-  const int32_t count = 1 + tables_above_c(tables + 1);
-  return n >= 0 && n < count ? tables[n] : NULL;
-}
+const tvk_set *tvk_nth(int32_t n) { return n >= 0 && n <= num_above_c() ? &sets[n] : NULL; }
 
-const tvk_table *tvk_select(int32_t set) {
-  const tvk_table *found = NULL, *table;
+const tvk_set *tvk_select(int32_t id) {
+  const tvk_set *found = NULL, *set;
   int32_t n;
-  for (n = 0; (table = tvk_nth(n)) != NULL; ++n) {
-    if (set == TV_KERNELS_AUTO || set == table->set) found = table;
+  for (n = 0; (set = tvk_nth(n)) != NULL; ++n) {
+    if (id == TV_KERNELS_AUTO || id == set->id) found = set;
   }
   return found;
 }
+
+#define TVK_DECLARE_TABLE(part, name) extern const tvk_##part##_table tvk_##part##_##name;
+#define TVK_ADDRESS(part, name) &tvk_##part##_##name,
+#define TVK_DEFINE_PART(part, LIST)                                                  \
+  TVK_SETS(TVK_DECLARE_TABLE, part)                                                  \
+  const tvk_##part##_table *tvk_##part##_of(const tvk_set *set) {                    \
+    static const tvk_##part##_table *const tables[] = {TVK_SETS(TVK_ADDRESS, part)}; \
+    return tables[set->index];                                                       \
+  }
+TVK_PARTS(TVK_DEFINE_PART)

@@ -4,12 +4,12 @@
 
 extern const tvk_dense_table tvk_dense_c, tvk_dense_avx2, tvk_dense_neon;
 
-const tvk_dense_table *tvk_dense_of(const tvk_table *kernels) {
+const tvk_dense_table *tvk_dense_of(const tvk_set *set) {
 #if defined(__x86_64__)
-  if (kernels->set >= TV_KERNELS_AVX2) return &tvk_dense_avx2;
+  if (set->id >= TV_KERNELS_AVX2) return &tvk_dense_avx2;
 #elif defined(__linux__) && (defined(__arm__) || defined(__aarch64__))
-  if (kernels->set == TV_KERNELS_NEON) return &tvk_dense_neon;
+  if (set->id == TV_KERNELS_NEON) return &tvk_dense_neon;
 #endif
-  (void)kernels;
+  (void)set;
   return &tvk_dense_c;
 }

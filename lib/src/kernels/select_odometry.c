@@ -4,11 +4,11 @@
 
 extern const tvk_odometry_table tvk_odometry_c, tvk_odometry_avx2;
 
-const tvk_odometry_table *tvk_odometry_of(const tvk_table *kernels) {
+const tvk_odometry_table *tvk_odometry_of(const tvk_set *set) {
 #if defined(__x86_64__)
-  if (kernels->set >= TV_KERNELS_AVX2) return &tvk_odometry_avx2;
+  if (set->id >= TV_KERNELS_AVX2) return &tvk_odometry_avx2;
 #else
-  (void)kernels;
+  (void)set;
 #endif
   return &tvk_odometry_c;
 }

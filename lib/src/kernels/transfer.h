@@ -84,9 +84,9 @@ static inline void transfer_squares_of(const double *const *arrays, const int32_
   }
 }
 
-void TVK_MATCH(transfer_squares)(const double *const *arrays, const int32_t *indices, int32_t first,
-                                 int32_t count, int32_t on_plane, const double *h,
-                                 double *squares) {
+void TVK_GEOMETRY(transfer_squares)(const double *const *arrays, const int32_t *indices,
+                                    int32_t first, int32_t count, int32_t on_plane, const double *h,
+                                    double *squares) {
   transfer_squares_of(arrays, indices, first, count, on_plane, h, squares);
 }
 
@@ -144,8 +144,8 @@ static inline void transfer_sums_of(const double *const *arrays, const int32_t *
   }
 }
 
-void TVK_MATCH(transfer_sums)(const double *const *arrays, const int32_t *indices, int32_t first,
-                              int32_t count, int32_t on_plane, const double *h, double inverse_sq,
-                              int32_t cauchy, double *sums) {
+void TVK_GEOMETRY(transfer_sums)(const double *const *arrays, const int32_t *indices, int32_t first,
+                                 int32_t count, int32_t on_plane, const double *h,
+                                 double inverse_sq, int32_t cauchy, double *sums) {
   transfer_sums_of(arrays, indices, first, count, on_plane, h, inverse_sq, cauchy, sums);
 }

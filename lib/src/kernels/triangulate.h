@@ -228,9 +228,9 @@ static inline lane_mask triangulate_block(const tvk_triangulate_pair *p, int met
   return left;
 }
 
-int32_t TVK_MATCH(triangulate)(const tvk_triangulate_pair *pair, int32_t method,
-                               const double *pixels0, const double *pixels1, int32_t count,
-                               tv_point *points) {
+int32_t TVK_GEOMETRY(triangulate)(const tvk_triangulate_pair *pair, int32_t method,
+                                  const double *pixels0, const double *pixels1, int32_t count,
+                                  tv_point *points) {
   const int32_t whole = count - count % TVK_LANES, rest = count - whole;
   lane_mask left = {0};
   int32_t k, any;

@@ -72,8 +72,8 @@ struct Template {
 
 // Gain and offset are eliminated, then the six normal equations are factorised. False where the
 // window has too little texture.
-bool make_template(const tvk_table& kernels, const tv_image& image, double x, double y, double step,
-                   Template* t) {
+bool make_template(const tvk_align_table& kernels, const tv_image& image, double x, double y,
+                   double step, Template* t) {
   constexpr int kOuter = TVK_WINDOW_SIDE + 2;
   if (image.width < kLeastWidth || !is_inside(image, x, y, Linear{{step, 0, 0, step}}, kOuter)) {
     return false;
@@ -194,12 +194,13 @@ uint8_t factor_of(const Template& t, double alike, double sample) {
 
 }  // namespace
 
-uint8_t align_keypoints(const tvk_table& kernels, const tv_image& image0, const tv_image& image1,
+uint8_t align_keypoints(const tvk_set& set, const tv_image& image0, const tv_image& image1,
                         double size_of_one, tv_keypoint* keypoint0, tv_keypoint* keypoint1,
                         const double (*shapes)[4]) {
   const bool in_order = is_before(*keypoint0, *keypoint1);
   if (!in_order && !is_before(*keypoint1, *keypoint0)) return 0;
   if (image0.stride_bytes > kMostStride || image1.stride_bytes > kMostStride) return 0;
+  const tvk_align_table& kernels = *tvk_align_of(&set);
   const tv_keypoint& fixed = in_order ? *keypoint0 : *keypoint1;
   tv_keypoint& moving = in_order ? *keypoint1 : *keypoint0;
   const tv_image& image = in_order ? image1 : image0;

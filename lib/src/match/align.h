@@ -22,7 +22,7 @@ inline constexpr int kAlignedOne = 128;
 // Matthews, IJCV 2004 (inverse composition). docs/algorithms/match.md. shapes: null, or the shapes
 // of both keypoints' patches (patch_shape of feature/tilts.h), which the affine map starts from in
 // place of sizes and angles.
-uint8_t align_keypoints(const tvk_table& kernels, const tv_image& image0, const tv_image& image1,
+uint8_t align_keypoints(const tvk_set& set, const tv_image& image0, const tv_image& image1,
                         double size_of_one, tv_keypoint* keypoint0, tv_keypoint* keypoint1,
                         const double (*shapes)[4] = nullptr);
 

@@ -115,7 +115,7 @@ struct Candidates {
   int32_t count;
 };
 
-void find_candidates(const tvk_table& kernels, const Side& a, int32_t i, const Side& b,
+void find_candidates(const tvk_match_table& kernels, const Side& a, int32_t i, const Side& b,
                      double band_sq, Candidates* candidates) {
   candidates->count = 0;
   if (a.view.valid[i] == 0) return;
@@ -156,8 +156,9 @@ struct Row {
 // Finds the nearest candidate and its rival for each row (keypoint of view 0), and the nearest row
 // for each column (keypoint of view 1). Rows and candidates are visited in ascending order, so that
 // the lower index wins a tie on both sides.
-void find_nearest(const tvk_table& kernels, const Side& side0, const Side& side1, double band_sq,
-                  double radius, Candidates* candidates, Row* rows, Nearest* columns) {
+void find_nearest(const tvk_match_table& kernels, const Side& side0, const Side& side1,
+                  double band_sq, double radius, Candidates* candidates, Row* rows,
+                  Nearest* columns) {
   std::fill(columns, columns + side1.view.num, Nearest{kFar, -1});
   for (int32_t i = 0; i < side0.view.num; ++i) {
     find_candidates(kernels, side0, i, side1, band_sq, candidates);
@@ -188,10 +189,11 @@ size_t guided_bytes(int32_t max_keypoints) {
          arena_bytes<Row>(n);
 }
 
-int32_t match_guided(const tvk_table& kernels, const GuidedView& view0, const GuidedView& view1,
+int32_t match_guided(const tvk_set& set, const GuidedView& view0, const GuidedView& view1,
                      const double M[9], const tv_guided_options& options, Arena& arena,
                      tv_correspondence* correspondences) {
   if (view0.num == 0 || view1.num == 0) return 0;
+  const tvk_match_table& kernels = *tvk_match_of(&set);
   ArenaScope scope(arena);
   const Side side0 = make_side(view0, M, false, arena);
   const Side side1 = make_side(view1, M, true, arena);

@@ -26,7 +26,7 @@ size_t guided_bytes(int32_t max_keypoints);
 // Matches the keypoints near each other's epipolar lines: ray1' M ray0 = 0, M row-major. Writes at
 // most min(view0.num, view1.num) correspondences in ascending order of idx0 and returns their
 // number.
-int32_t match_guided(const tvk_table& kernels, const GuidedView& view0, const GuidedView& view1,
+int32_t match_guided(const tvk_set& set, const GuidedView& view0, const GuidedView& view1,
                      const double M[9], const tv_guided_options& options, Arena& arena,
                      tv_correspondence* correspondences);
 

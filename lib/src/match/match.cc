@@ -94,7 +94,7 @@ float order_keypoints(const tv_keypoint* keypoints, int32_t num, void* scratch, 
 
 // A descriptor, the side that it is compared with, and its list.
 struct Query {
-  const tvk_table* kernels;
+  const tvk_match_table* kernels;
   const uint8_t* descriptor;
   const Side* side;
   const tvk_nearest* list;
@@ -253,7 +253,7 @@ float ratio_of(int32_t best, int32_t second, double largest) {
 }
 
 // Where descriptor i of the first side has a match, returns true and fills *match.
-bool match_row(const tvk_table& kernels, const Side sides[2], const tvk_nearest& row,
+bool match_row(const tvk_match_table& kernels, const Side sides[2], const tvk_nearest& row,
                const tvk_nearest_lists* of_columns, const tv_match_options& options, int32_t i,
                tv_correspondence* match) {
   if (!may_be_mutual(row, of_columns)) return false;
@@ -304,9 +304,10 @@ size_t match_bytes(int32_t max_keypoints) {
                   arena_bytes<tv_correspondence>(n));
 }
 
-int32_t match_descriptors(const tvk_table& kernels, const tv_features& features0,
+int32_t match_descriptors(const tvk_set& set, const tv_features& features0,
                           const tv_features& features1, const tv_match_options& options,
                           Arena& arena, const tv_correspondence** found) {
+  const tvk_match_table& kernels = *tvk_match_of(&set);
   const tv_features* const features[2] = {&features0, &features1};
   const size_t most = static_cast<size_t>(std::min(features0.num, features1.num));
   if (most == 0) return 0;

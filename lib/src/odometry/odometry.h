@@ -137,7 +137,7 @@ struct tv_odometry {
   tv::Camera camera;  // the same, with another principal point where it was moved
   tv::CameraEvidence camera_evidence;
   tv_context* context;  // of the stages that a frame takes through the public functions
-  const tvk_table* kernels;
+  const tvk_set* kernels;
   int32_t max_matched;  // descriptors of one side of a match
   tv_feature_options features;
   tv::Map map;

@@ -74,6 +74,7 @@ int32_t find_points(Odometry* odometry, const PointSearch& search, Frame* frame)
   Map& map = odometry->map;
   const tv_camera& model = odometry->camera.model;
   const int32_t columns = odometry->grid_columns;
+  const tvk_match_table& kernels = *tvk_match_of(odometry->kernels);
   double centre[3];
   centre_of(search.cam_from_world, centre);
   ArenaScope scope(odometry->scratch);
@@ -120,8 +121,8 @@ int32_t find_points(Odometry* odometry, const PointSearch& search, Frame* frame)
       }
     }
     if (num == 0) continue;
-    odometry->kernels->squared_distances(descriptor_of(map, idx), frame->descriptors, candidates,
-                                         num, distances);
+    kernels.squared_distances(descriptor_of(map, idx), frame->descriptors, candidates, num,
+                              distances);
     int32_t best = 0;
     for (int32_t n = 1; n < num; ++n) {
       if (distances[n] < distances[best]) best = n;

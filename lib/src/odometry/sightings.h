@@ -19,7 +19,7 @@ namespace tv {
 
 // What the caller gave (tv_pixel_points); all that is per match has num entries.
 struct SightingInput {
-  const tvk_table* kernels;
+  const tvk_set* kernels;
   Camera camera;
   const double *pixels, *points;
   const float *ratios, *sigmas;  // null: no order, 1 for all

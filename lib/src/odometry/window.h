@@ -13,7 +13,7 @@ size_t window_scratch_bytes(const tv_window& window);
 
 // Where the adjustment begins.
 struct WindowStart {
-  const tvk_table* kernels;
+  const tvk_set* kernels;
   const double* planes = nullptr;  // two for each observation, as make_observation takes them
   double damping = 1e-4;           // of the first step, a share of the Hessian's diagonal
 };

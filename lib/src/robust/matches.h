@@ -18,9 +18,9 @@ struct TwoViewProblem {
   int num;
   const uint8_t* is_still;  // null, or of each match whether it is left out (robust/still.h)
   tv_estimate_options options;
-  double focal_log_scale;    // logarithm of the cameras' focal length over the given one
-  bool focal_is_ambiguous;   // whether two directions of motion fit, each at its own focal length
-  const tvk_table* kernels;  // null: the kernels of the base ISA
+  double focal_log_scale;   // logarithm of the cameras' focal length over the given one
+  bool focal_is_ambiguous;  // whether two directions of motion fit, each at its own focal length
+  const tvk_geometry_table* kernels;  // null: the kernels of the base ISA
   double sigma(int view, int32_t i) const { return sigma_at(sigmas[view], i); }
 };
 

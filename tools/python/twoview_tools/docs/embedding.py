@@ -4,7 +4,8 @@ usage: scripts/python -m twoview_tools.docs.embedding [--check] [--footprint FIL
 
 The tables of memory are what the built library says (tv_context_size, tv_odometry_size), and equal
 on every CPU; the test docs/embedding runs --check. FILE is what scripts/footprint printed: the
-table of code, which differs by compiler. Each table stands behind a line <!-- made: NAME -->."""
+tables of code and of programs, which differ by compiler. Each table stands behind a line
+<!-- made: NAME -->."""
 
 import argparse
 import os
@@ -21,6 +22,12 @@ ODOMETRIES = ((320, 240, 300, 20, 2000), (320, 240, 500, 50, 5000), (640, 480, 5
               (1280, 720, 1000, 200, 20000), (640, 480, 2000, 200, 20000),
               (640, 480, 1000, 1000, 100000))
 CPUS = ("x86-64", "aarch64", "armv7")
+PROGRAMS = {  # of scripts/footprint_programs.c
+    "detect": "`tv_detect`",
+    "match": "`tv_extract` and `tv_match`",
+    "pose": "`tv_estimate_two_view`, with matches of the caller's",
+    "reconstruct": "`tv_reconstruct`: everything about two images",
+    "track": "`tv_odometry_track`"}
 
 
 def _grouped(count):
@@ -58,13 +65,20 @@ def odometry_table():
     return _table(["image", "`max_keypoints`", "`max_keyframes`", "`max_points`", "bytes"], rows)
 
 
+def _by_cpu(printed):
+    """The CPUs of a text that scripts/footprint printed, and what it says of each."""
+    parts = [(part.split("\n")[0].strip(), part)
+             for part in re.split(r"^(?=\S)", printed, flags=re.M)]
+    found = [(cpu, part) for cpu, part in parts if cpu in CPUS and "text" in part]
+    if not found:
+        raise SystemExit("no architecture of " + ", ".join(CPUS) + " in that text")
+    return found
+
+
 def code_table(printed):
     """printed: the text of scripts/footprint."""
     rows, cpus = {}, []
-    for part in re.split(r"^(?=\S)", printed, flags=re.M):
-        cpu = part.split("\n")[0].strip()
-        if cpu not in CPUS or "text" not in part:
-            continue
+    for cpu, part in _by_cpu(printed):
         cpus.append(cpu)
         whole = re.search(r"text (\d+)  data (\d+)", part)
         parts = re.search(r"without the parts (\d+).*?odometry (\d+) .*?cloud (\d+) .*?room (\d+)",
@@ -76,9 +90,16 @@ def code_table(printed):
         values["deepest stack"] = stack and stack[1]  # scripts/footprint --built LIBRARY has none
         for name, value in values.items():
             rows.setdefault(name, []).append(_grouped(int(value)) if value else "-")
-    if not cpus:
-        raise SystemExit("no architecture of " + ", ".join(CPUS) + " in that text")
     return _table(["bytes of text and data", *cpus], [[name, *row] for name, row in rows.items()])
+
+
+def programs_table(printed):
+    """printed: the text of scripts/footprint."""
+    found = _by_cpu(printed)
+    sizes = [dict(re.findall(r"^  program (\w+) (\d+)$", part, flags=re.M)) for _, part in found]
+    return _table(["a program that calls", *(cpu for cpu, _ in found)],
+                  [[calls, *(_grouped(int(of_cpu[name])) if name in of_cpu else "-"
+                             for of_cpu in sizes)] for name, calls in PROGRAMS.items()])
 
 
 def replaced(text, name, table):
@@ -99,7 +120,9 @@ def main():
     text = replaced(text, "odometry", odometry_table())
     if arguments.footprint:
         with open(arguments.footprint, encoding="utf-8") as file:
-            text = replaced(text, "code", code_table(file.read()))
+            printed = file.read()
+        text = replaced(text, "code", code_table(printed))
+        text = replaced(text, "programs", programs_table(printed))
     if text == before:
         return 0
     if arguments.check:
