@@ -10,8 +10,9 @@ default). A pose is wrong where the larger of the rotation's and the direction's
 sign) is above 5 degrees, and right where it is at most 2. ms: CPU time of a pair, the mean.
 
 The last table asks whether a climb despite an "ok" would pay: where probability_wrong of rung 0 is
-above a threshold, rung 2 and 3 are run as well, and the pose of the lower probability_wrong is
-taken. The threshold of each set is the one of the best mean AUC over all other sets ("left out").
+above a threshold, rung 2 is run as well (and 3, where 2 is not "ok"), and its pose is taken where
+it is "ok", too. The threshold of each set is the one of the best mean AUC over all other sets
+("left out").
 """
 
 import os
@@ -122,7 +123,7 @@ def with_threshold(ways, threshold):
     if first["num_rungs"] > 1 or first["verdict"] != "ok" or (
             first["probability_wrong"] <= threshold):
         return first
-    return min(first, again, key=lambda row: row["probability_wrong"])
+    return again if again["verdict"] == "ok" else first
 
 
 def left_out(pairs):
