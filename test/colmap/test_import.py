@@ -5,6 +5,7 @@ import contextlib
 import json
 import os
 import shutil
+import sqlite3
 import subprocess
 
 import numpy as np
@@ -200,7 +201,6 @@ def views_of(points):
 
 @pytest.mark.parametrize("schema", ["4", "3.8"])
 def test_a_focal_length_that_colmap_guessed_is_no_truth(exported, models, tmp_path, schema, call):
-    import sqlite3
     path = tmp_path / "x.db"
     shutil.copy(exported[schema], path)
     guess = np.array([1.3 * FX, 1.3 * FY, CX + 0.5, CY + 0.5])
@@ -231,7 +231,6 @@ def test_a_focal_length_that_colmap_guessed_is_no_truth(exported, models, tmp_pa
 
 
 def test_the_summary_says_what_counts_as_guessed(exported, models, tmp_path, call, refuse):
-    import sqlite3
     shutil.copy(exported["3.8"], tmp_path / "x.db")
     arguments = ("import", "--database", tmp_path / "x.db", "-o", tmp_path / "o")
     assert "guessed" not in call(*arguments)[1]
@@ -290,7 +289,6 @@ ALIKED = "ALIKED_N16ROT"
 ])
 def test_descriptors_of_other_features_need_matches(tmp_path, kind, columns, values, words, refuse,
                                                     call):
-    import sqlite3
     path = tmp_path / "x.db"
     write_database(path, views_of(scene_points(80)), with_matches=False,
                    descriptors=sift_like(80))
@@ -325,7 +323,6 @@ def sift_like(count):
 
 
 def test_pairs_without_matches_beside_pairs_with_them(exported, tmp_path, call):
-    import sqlite3
     path = shutil.copy(exported["4"], tmp_path / "x.db")
     with contextlib.closing(sqlite3.connect(path)) as database:
         for table in ("matches", "two_view_geometries"):
@@ -340,10 +337,35 @@ def test_pairs_without_matches_beside_pairs_with_them(exported, tmp_path, call):
     assert [pair["matches_from"] for pair in report["pairs"]] == ["matches", None, None]
 
 
+def test_keypoints_that_are_no_numbers_are_counted(exported, tmp_path, call):
+    path = tmp_path / "nan.db"
+    shutil.copy(exported["4"], path)
+    with contextlib.closing(sqlite3.connect(path)) as database, database:
+        rows, cols = database.execute("SELECT rows, cols FROM keypoints WHERE image_id = 1"
+                                      ).fetchone()
+        database.execute("UPDATE keypoints SET data = ? WHERE image_id = 1",
+                         (np.full((rows, cols), np.nan, np.float32).tobytes(),))
+    status, out, _ = call("import", "--database", path, "-o", tmp_path / "out")
+    assert status == 0 and f"{rows} keypoints of {NAMES[0]} are NaN or infinite" in out
+    report = json.loads((tmp_path / "out" / "report.json").read_text())
+    assert report["invalid_keypoints"] == {NAMES[0]: rows}
+
+
+def test_a_fisheye_of_a_model_is_written_and_read_back(models, tmp_path, call):
+    shutil.copytree(models["text"], tmp_path / "model")
+    cameras = tmp_path / "model" / "cameras.txt"
+    cameras.write_text(f"1 OPENCV_FISHEYE {WIDTH} {HEIGHT} {FX} {FY} {CX + 0.5} {CY + 0.5} "
+                       "0.1 0.02 0 -0.001\n")
+    status, _, err = call("import", "--model", tmp_path / "model", "-o", tmp_path / "out")
+    assert status == 0, err
+    (camera,) = read_camera_set(tmp_path / "out" / "cameras.yaml").values()
+    assert camera.model == tv.CameraModel.KANNALA_BRANDT
+    assert tuple(camera.k[:4]) == (0.1, 0.02, 0, -0.001)
+
+
 @pytest.mark.parametrize("matches", ["no row", "a row of none", "as they were"])
 def test_verified_geometries_alone_are_used(exported, models, tmp_path, matches, call, refuse):
     """As pipelines write them that verify their own matches; a pair of a watermark is none."""
-    import sqlite3
     path = shutil.copy(exported["4"], tmp_path / "x.db")
     with contextlib.closing(sqlite3.connect(path)) as database:
         if matches == "no row":
@@ -383,7 +405,6 @@ BLANKS = {"a.png": "my a.png", "b.png": "my b.png", "c.png": "sub folder/c d.png
 @pytest.mark.parametrize("form, newline", [("text", "\n"), ("text", "\r\n"), ("binary", "\n")])
 def test_names_with_blanks_are_whole_or_named(exported, models, tmp_path, form, newline, call,
                                               refuse):
-    import sqlite3
     folder = shutil.copytree(models["text"], tmp_path / "model")
     lines = (folder / "images.txt").read_text().split("\n")
     lines = [" ".join([*line.split()[:9], BLANKS[line.split()[9]]])
@@ -439,7 +460,6 @@ def test_what_is_no_model_or_no_database(models, tmp_path, refuse):
 
 
 def test_a_match_without_a_keypoint_is_named(tmp_path, refuse):
-    import sqlite3
     write_database(tmp_path / "x.db", views_of(scene_points(20)))
     database = sqlite3.connect(tmp_path / "x.db")
     database.execute(

@@ -34,20 +34,6 @@ def read_camera_set(path):
         return {name: _camera(found) for name, found in formats.read_camera_set(path).items()}
 
 
-def write_camera_set(cameras):
-    """Formats {name: camera} as the text of a cameras.yaml."""
-    text = ""
-    for name, camera in cameras.items():
-        k = list(camera.k) + [0.0] * 8
-        if camera.model == tv.CameraModel.KANNALA_BRANDT or any(k[5:8]):
-            raise ValueError(f"{name}: cameras.yaml holds k1 k2 p1 p2 k3 and no other lens")
-        values = [camera.fx, camera.fy, camera.cx, camera.cy, *k[:5]]
-        text += f"{name}:\n  image_width: {camera.width}\n  image_height: {camera.height}\n"
-        text += "".join(f"  {key}: {float(value)!r}\n" for key, value in
-                        zip("fx fy cx cy k1 k2 p1 p2 k3".split(), values))
-    return text
-
-
 def film_camera(focal_35mm, width, height):
     """A pinhole camera from the focal length as for 35 mm film, in millimetres, as the program's
     --focal-35mm makes it: of the image's diagonal, with the principal point in its middle."""

@@ -207,6 +207,7 @@ def _import(arguments):
     _say(a, report, f"{a.output}/report.json: {report['num_pairs']} pairs, {posed} with a pose"
                     + (f"; AUC at 5, 10, 20 degrees {areas}" if areas else "")
                     + _words_on_matches(report)
+                    + _words_on_invalid(report["invalid_keypoints"])
                     + _words_on_guessed(report["guessed_focal_lengths"], a))
     return EXIT_DONE if posed else EXIT_NO_POSE
 
@@ -218,6 +219,16 @@ def _words_on_matches(report):
              f"the table matches has none" if verified else "")
     return words + "".join(f"; {count} pairs have no matches: {reason}"
                            for reason, count in report["without_matches"].items())
+
+
+def _words_on_invalid(counts):
+    """Continues the summary: the images whose keypoints are no finite numbers, which belong to no
+    pose."""
+    if not counts:
+        return ""
+    name, count = next(iter(counts.items()))
+    return (f"; {count} keypoints of {name} are NaN or infinite, and their matches are left out"
+            + (f" (so it is with {len(counts) - 1} more images)" if len(counts) > 1 else ""))
 
 
 def _words_on_guessed(names, arguments):

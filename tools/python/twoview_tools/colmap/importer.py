@@ -10,7 +10,7 @@ import twoview as tv
 from ..accuracy import metrics  # pose errors have the definition of the accuracy tables
 from ..folders import foreign_words
 from . import database as db
-from .cameras import read_camera, read_sigmas, write_camera_set
+from .cameras import read_camera, read_sigmas
 from .conventions import camera_from_colmap, pixels_from_colmap
 from .engine import Engine
 from .errors import BadInput
@@ -58,9 +58,10 @@ def _named_cameras(model):
     by_K = {}
     for name, camera in cameras.items():
         same = by_K.setdefault((camera.fx, camera.cx), camera)
-        if (same.width, same.height, tuple(same.k)) != (
+        if (same.width, same.height, same.model, tuple(same.k)) != (
             camera.width,
             camera.height,
+            camera.model,
             tuple(camera.k),
         ):
             raise BadInput(
@@ -68,7 +69,7 @@ def _named_cameras(model):
                 f"apart"
             )
     try:
-        return cameras, write_camera_set(cameras)
+        return cameras, tv.format_cameras(cameras, "cameras.yaml")
     except ValueError as error:
         raise BadInput(str(error)) from None
 
@@ -120,6 +121,7 @@ class Features:
         self.pixels, self.descriptors, self.cameras = {}, {}, {}
         self.matches, self.verified = {}, {}  #: by pair of names, as two tables of the database
         self.sigmas = {}  #: CalibrationSigmas by image
+        self.invalid = {}  #: by image: how many of its keypoints are not finite, where any is
         with db.reading(path) as database:
             try:
                 self._read(database, given)
@@ -136,6 +138,9 @@ class Features:
             self.sigmas[name] = (self._sigmas_given[0] if given else
                                  GUESSED if camera_id in guessed else EXACT)
             self.pixels[name] = pixels_from_colmap(db.read_keypoints(database, self.path, image_id))
+            num_invalid = int((~np.isfinite(self.pixels[name])).any(axis=1).sum())
+            if num_invalid:
+                self.invalid[name] = num_invalid
             self.descriptors[name] = db.read_descriptors(database, self.path, image_id)
         self._read_matches(db.read_matches(database, self.path), names, self.matches)
         self._read_matches(db.read_verified_matches(database, self.path), names, self.verified)
@@ -315,6 +320,7 @@ def import_database(
     }
     report.update(num_pairs=len(rows), pairs=rows, options={"database": os.path.basename(path)},
                   guessed_focal_lengths=features.guessed(), without_matches=without,
+                  invalid_keypoints=features.invalid,
                   seed=estimate.seed, version=tv.version_string())
     write_files(folder, {"report.json": json.dumps(metrics.finite(report), indent=1) + "\n"})
     return report
