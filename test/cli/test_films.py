@@ -167,6 +167,14 @@ class Films(CliTest):
         self.assertTrue(result["film"]["interlaced"])
         self.assertIn("the film is interlaced by its container", " ".join(result["notes"]))
 
+    def test_films_that_were_joined_as_bytes_are_named(self):
+        half = COUNT // 2
+        first = mov(PICTURES[:half], TIMES[:half])
+        result = self.track(first + mov(PICTURES[half:], TIMES[:COUNT - half]))
+        self.assertTrue(result["film"]["joined"])
+        self.assertEqual(result["num_frames"], half)
+        self.assertIn("several films one behind the other", " ".join(result["notes"]))
+
     def test_a_film_that_is_cut_off_is_tracked_as_far_as_it_goes(self):
         times = [i / 5 for i in range(COUNT)]
         whole = mov(PICTURES, times, index_first=True)

@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
 """Tests of folders of pictures: their order, and what is left out of them."""
+import struct
+
 from cli_support import CliTest, camera_yaml, main, png
 from test_odometry import COUNT, FPS, HEIGHT, LUMA, PICTURES, TIMES, TUM_TRUTH, WIDTH
 
@@ -187,6 +189,27 @@ class Pictures(CliTest):
                 self.assertEqual(self.luma_of(head % (WIDTH, HEIGHT, white) + data, "p.pgm"), plain)
         data = b"".join((v * 4369).to_bytes(2, "big") for v in grey)
         self.assertEqual(self.luma_of(head % (WIDTH, HEIGHT, 65535) + data, "p.pgm"), plain)
+
+    def test_more_pictures_than_the_first_are_named_by_every_verb(self):
+        """A grey TIFF of two pages, the second of another picture."""
+        def page(at, data, follows):
+            tags = [(256, WIDTH), (257, HEIGHT), (258, 8), (259, 1), (262, 1),
+                    (273, at + 102), (277, 1), (278, HEIGHT)]
+            entries = b"".join(struct.pack("<HHII", tag, 4, 1, value) for tag, value in tags)
+            return struct.pack("<H", 8) + entries + struct.pack("<I", follows) + data
+        second = 8 + 102 + WIDTH * HEIGHT
+        camera = self.write("own.yaml", camera_yaml())
+        from cli_support import stereo_pair
+        for name, data in zip("ab", stereo_pair()):
+            self.write(f"p/{name}.tif", b"II*\0\x08\0\0\0" + page(8, data, second)
+                       + page(second, bytes(WIDTH * HEIGHT), 0))
+        a, b = "p/a.tif", "p/b.tif"
+        for verb in (("detect", a), ("match", a, b), ("reconstruct", a, b, "--camera", camera),
+                     ("undistort", a, b, "--camera", camera),
+                     ("odometry", "p", "--fps", 10, "--camera", camera)):
+            with self.subTest(verb=verb[0]):
+                done = self.run_program(*verb, "-o", self.folder / verb[0])
+                self.assertIn(b"files that hold several pictures", done.stdout + done.stderr)
 
     def test_sixteen_bits_of_which_few_are_used_are_stretched(self):
         left = self.left()

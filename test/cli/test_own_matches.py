@@ -213,6 +213,10 @@ class OwnMatches(cli.CliTest):
         self.refused("1 2 3 4\n1 2 x 4\n", "line 2", "x1", name="own.csv")
         self.refused("x0 y0 x1 y1 score\n1 2 3 4 -\n", "line 2", "score", name="own.csv")
 
+    def test_exchanged_sides_are_refused_since_the_pictures_do_not_agree(self):
+        a, b = points(self.rows, 0), points(self.rows, 1)
+        self.refused(npz(mkpts0=b, mkpts1=a), "look alike", "sides are exchanged")
+
     def test_normalised_coordinates_are_refused(self):
         for scale in (1 / WIDTH, 1 / cli.FOCAL, 2 / WIDTH):
             rows = [tuple(scale * v for v in row) for row in self.rows]

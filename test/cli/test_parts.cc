@@ -26,6 +26,7 @@
 #include "pictures/canvas.h"
 #include "report/report.h"
 #include "report/tables.h"
+#include "sources/joined_films.h"
 #include "sources/stream_clock.h"
 
 // unity.h comes after all other headers: it defines isnan and isinf as macros.
@@ -502,6 +503,77 @@ void test_headers_are_read_within_their_bytes() {
 
 bool base64_is(const char* bytes, const char* expected) { return base64(bytes) == expected; }
 
+// Of a TIFF file of two pages: a width each, and what the second one is (tag 254).
+bool second_page_counts(char kind, char next = 0) {
+  using namespace std::string_literals;
+  const std::string head = "II*\0\b\0\0\0\1\0\0\1\3\0\1\0\0\0\5\0\0\0\x1a\0\0\0"s;
+  const std::string second =
+      "\2\0\xfe\0\4\0\1\0\0\0"s + kind + "\0\0\0\0\1\3\0\1\0\0\0\5\0\0\0"s + next + "\0\0\0"s;
+  return read_image_header(head + second).has_more;
+}
+
+bool is_animated(const std::string& bytes) { return read_image_header(bytes).has_more; }
+
+void test_files_of_several_pictures_are_known() {
+  using namespace std::string_literals;
+  TEST_ASSERT_TRUE(second_page_counts(0));
+  TEST_ASSERT_TRUE(second_page_counts(2));         // a page of several
+  TEST_ASSERT_FALSE(second_page_counts(1));        // a smaller one of the first
+  TEST_ASSERT_FALSE(second_page_counts(4));        // its mask
+  TEST_ASSERT_FALSE(second_page_counts(1, 0x1a));  // a circle of pages comes to an end
+  const std::string png = "\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\1\2\0\0\0\7\b\0\0\0\0CCCC"s;
+  const std::string end = "\0\0\0\0CCCC\0\0\0\0IENDCCCC"s;
+  TEST_ASSERT_FALSE(is_animated(png + end));
+  TEST_ASSERT_FALSE(is_animated(png +
+                                "\0\0\0\x08"
+                                "acTL\0\0\0\1"s +
+                                end));
+  TEST_ASSERT_TRUE(is_animated(png +
+                               "\0\0\0\x08"
+                               "acTL\0\0\0\2"s +
+                               end));
+  TEST_ASSERT_FALSE(is_animated("RIFF....WEBPVP8X\x0a\0\0\0\x10\0\0\0........"s));
+  TEST_ASSERT_TRUE(is_animated("RIFF....WEBPVP8X\x0a\0\0\0\x12\0\0\0........"s));
+}
+
+bool is_joined(const std::string& bytes) {
+  char name[] = "/tmp/twoview_joined_XXXXXX";
+  const int file = mkstemp(name);
+  const bool is_written = write(file, bytes.data(), bytes.size()) == ssize_t(bytes.size());
+  close(file);
+  const bool found = is_written && is_joined_film(name);
+  unlink(name);
+  return found;
+}
+
+void test_films_that_were_joined_as_bytes_are_known() {
+  using namespace std::string_literals;
+  const std::string avi = "RIFF\7\0\0\0AVI xyz\0"s, more = "RIFF\4\0\0\0AVIX"s;
+  const std::string mp4 =
+      "\0\0\0\x0c"
+      "ftypisom"
+      "\0\0\0\x08"
+      "moov"
+      "\0\0\0\1"
+      "mdat\0\0\0\0\0\0\0\x12"
+      "xx"s;
+  const std::string flv =
+      "FLV\1\5\0\0\0\x09\0\0\0\0"
+      "\x09\0\0\3\0\0\0\0\0\0\0xyz\0\0\0\x0e"s;
+  for (const std::string& film : {avi, mp4, flv}) {
+    TEST_ASSERT_FALSE(is_joined(film));
+    TEST_ASSERT_TRUE(is_joined(film + film));
+    TEST_ASSERT_FALSE(is_joined(film + "something else"));
+  }
+  TEST_ASSERT_FALSE(is_joined(avi + more));
+  TEST_ASSERT_TRUE(is_joined(avi + more + avi));
+  TEST_ASSERT_FALSE(is_joined(mp4 +
+                              "\0\0\0\0"
+                              "mdat"s +
+                              mp4));  // data up to the end
+  TEST_ASSERT_FALSE(is_joined(""));
+}
+
 void test_base64_has_the_vectors_of_rfc_4648() {
   TEST_ASSERT_TRUE(base64_is("", ""));
   TEST_ASSERT_TRUE(base64_is("f", "Zg=="));
@@ -819,6 +891,8 @@ int main() {
   RUN_TEST(test_the_longest_name_that_begins_the_files_name_serves_it);
   RUN_TEST(test_an_images_camera_has_the_lines_K_and_the_entrys_lens_and_size);
   RUN_TEST(test_pairs_lines_have_two_four_twenty_two_or_thirty_eight_fields);
+  RUN_TEST(test_files_of_several_pictures_are_known);
+  RUN_TEST(test_films_that_were_joined_as_bytes_are_known);
   RUN_TEST(test_headers_are_read_within_their_bytes);
   RUN_TEST(test_a_pose_that_an_uncertain_focal_length_leaves_open_asks_for_a_calibration);
   RUN_TEST(test_each_reason_has_words_and_advice_and_no_reason_none);

@@ -19,6 +19,7 @@ import twoview as tv
 from twoview_tools.colmap import exporter, schema38, settings
 from twoview_tools.colmap.database import appended_database
 from twoview_tools.colmap.errors import BadInput
+from twoview_tools.colmap.images import holds_more
 from conftest import CAMERA, CX, CY, HEIGHT, NAMES, WIDTH, run, start
 
 pycolmap = pytest.importorskip("pycolmap")
@@ -604,6 +605,16 @@ def test_hidden_and_damaged_pictures_are_left_out(photographs, tmp_path, call):
     assert f"{first.stem}.pgm has the name of another picture, but for the ending" in err
     assert "is a copy of another picture, by its name and its look (so are 1 more)" in err
     assert f"1 picture of {tmp_path} is left out: zz.png " in err
+
+
+def test_files_of_several_pictures_are_named(tmp_path):
+    Image = pytest.importorskip("PIL.Image")
+    pages = [Image.new("L", (32, 24), grey) for grey in (10, 200)]
+    for ending in ("tif", "png", "webp"):
+        for more in ([], pages[1:]):
+            path = tmp_path / f"{len(more)}.{ending}"
+            pages[0].save(path, save_all=bool(more), append_images=more)
+            assert holds_more(path) == bool(more), path
 
 
 def test_bad_arguments_are_one_line(tmp_path, refuse):

@@ -44,13 +44,14 @@ std::string frame_name(int64_t index) {
 
 }  // namespace
 
-void read_images(const std::vector<std::string>& paths, const TakeFrame& take,
-                 const LeaveOut& leave_out) {
+std::vector<std::string> read_images(const std::vector<std::string>& paths, const TakeFrame& take,
+                                     const LeaveOut& leave_out) {
   std::vector<cv::Size> sizes;
   for (const std::string& path : paths) sizes.push_back(header_size(path));
   cv::Size usual = most_frequent(sizes);
   std::string first_problem;
   int num_taken = 0;
+  bool has_more = false;
   for (const std::string& path : paths) {
     const std::string name = std::filesystem::path(path).filename().string();
     Picture picture;
@@ -69,9 +70,11 @@ void read_images(const std::vector<std::string>& paths, const TakeFrame& take,
       continue;
     }
     ++num_taken;
-    if (!take(picture.luma, picture.name)) return;
+    has_more = has_more || picture.has_more;
+    if (!take(picture.luma, picture.name)) break;
   }
   if (num_taken == 0) throw BadInput(first_problem);
+  return has_more ? std::vector<std::string>{kMoreNote} : std::vector<std::string>{};
 }
 
 bool is_live(const std::string& video) {
@@ -94,6 +97,7 @@ std::vector<std::string> read_video_file(const std::string& path, const TakeFram
     notes.push_back(stored + ": the camera is of such pictures");
   if (facts.pixel_aspect != 1)
     notes.push_back("the video's pixels are not square, so fx and fy of the camera differ");
+  if (facts.is_joined) notes.emplace_back(kJoinedNote);
   if (facts.is_interlaced) notes.emplace_back(kInterlacedNote);
   const auto promised = static_cast<double>(video.num_promised());
   const double fps = facts.rate_hz;

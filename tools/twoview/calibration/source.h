@@ -19,8 +19,9 @@ using LeaveOut =
 // These functions throw BadInput for a source that cannot be read. An image that cannot be read, or
 // is of another size than most of them, is left out; BadInput where none is left, or where a file
 // is missing.
-void read_images(const std::vector<std::string>& paths, const TakeFrame& take,
-                 const LeaveOut& leave_out);
+// Returns what the user must know of the images, as lines without an end.
+std::vector<std::string> read_images(const std::vector<std::string>& paths, const TakeFrame& take,
+                                     const LeaveOut& leave_out);
 
 // Returns true for a live source: a number of at most three digits that names no file, a path that
 // begins with /dev/, or an address that contains "://".

@@ -178,8 +178,10 @@ cv::Mat checked_pixels(const std::string& path, const std::string& bytes) {
 
 }  // namespace
 
-cv::Mat load_pixels(const std::string& path) {
-  return checked_pixels(path, read_file(path, kMaxFileBytes));
+cv::Mat load_pixels(const std::string& path, bool* has_more) {
+  const std::string bytes = read_file(path, kMaxFileBytes);
+  if (has_more && read_image_header(bytes).has_more) *has_more = true;
+  return checked_pixels(path, bytes);
 }
 
 Picture load_picture(const std::string& path) {
@@ -191,9 +193,11 @@ Picture load_picture(const std::string& path) {
     cv::cvtColor(pixels, opaque, cv::COLOR_BGRA2BGR);
     pixels = opaque;
   }
+  const ImageHeader header = read_image_header(bytes);
+  picture.has_more = header.has_more;
   picture.is_16bit = pixels.depth() == CV_16U;
   if (picture.is_16bit) {
-    const int64_t said = read_image_header(bytes).max_sample;
+    const int64_t said = header.max_sample;
     pixels = reduced(pixels, said > 255 && said < 65535 ? said : 65535, picture.is_stretched);
   }
   picture.path = path;

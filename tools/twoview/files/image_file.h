@@ -23,6 +23,7 @@ struct Picture {
   ExifFocal exif;
   int turn_deg = 0;           // how far a viewer turns it clockwise, which is not done here
   bool is_16bit = false;      // in its file
+  bool has_more = false;      // pictures in its file, of which it is the first
   bool is_stretched = false;  // 16-bit samples that use less than half of their range
 
   tv_image view() const;
@@ -50,9 +51,14 @@ constexpr const char* kStretchedNote =
     "16-bit pictures that use less than half of their range are stretched to 8 bits, each from its "
     "0.5 to its 99.5 percentile";
 
+// The note on files that hold more than the picture that is used.
+constexpr const char* kMoreNote =
+    "there are files that hold several pictures (pages of a TIFF, frames of an animation): the "
+    "first of each is used";
+
 // Decodes all pixels without conversion: 8 or 16 bits, 1, 3 (BGR) or 4 (BGRA) channels. Throws
-// BadInput like load_picture.
-cv::Mat load_pixels(const std::string& path);
+// BadInput like load_picture. has_more, if given: set where the file holds more pictures than this.
+cv::Mat load_pixels(const std::string& path, bool* has_more = nullptr);
 
 // What a picture of a format that is not read is and what to do about it, such as "is a HEIC
 // picture, which is not read: convert it to JPEG"; empty for what is none of HEIC, AVIF and GIF.

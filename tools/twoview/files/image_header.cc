@@ -28,6 +28,8 @@ ImageHeader read_png(Bytes bytes) {
   for (size_t at = 8; at + 12 <= bytes.size();) {  // PNG chunk: length, type, data, checksum
     const uint64_t length = number(bytes, at, 4, true);
     if (length > bytes.size() - at - 12) break;
+    if (bytes.substr(at + 4, 4) == "acTL")  // animated: the number of frames comes first
+      header.has_more = number(bytes, at + 8, 4, true) > 1;
     if (bytes.substr(at + 4, 4) == "IEND") header.truncated = false;
     at += static_cast<size_t>(length) + 12;
   }
@@ -104,19 +106,49 @@ ImageHeader read_pnm(Bytes bytes) {
   return header;
 }
 
-ImageHeader read_tiff(Bytes bytes) {
-  ImageHeader header;
-  const bool big = bytes[0] == 'M';
-  const size_t directory = static_cast<size_t>(number(bytes, 4, 4, big));
+// A directory of a TIFF file: one picture.
+struct TiffPage {
+  int64_t width = 0, height = 0;
+  bool is_picture = true;  // and not a preview of another page, or its mask
+  size_t next = 0;         // where the next page's directory begins; 0: none
+};
+
+TiffPage read_tiff_page(Bytes bytes, size_t directory, bool big) {
+  TiffPage page;
   const uint64_t count = number(bytes, directory, 2, big);
   for (uint64_t i = 0; i < count; ++i) {
     const size_t at = directory + 2 + static_cast<size_t>(i) * 12;
     const uint64_t tag = number(bytes, at, 2, big);
     const int width = number(bytes, at + 2, 2, big) == 3 ? 2 : 4;  // SHORT: 2 bytes, LONG: 4
     const auto value = static_cast<int64_t>(number(bytes, at + 8, width, big));
-    if (tag == 256) header.width = value;
-    if (tag == 257) header.height = value;
+    if (tag == 254) page.is_picture = (value & 5) == 0;  // NewSubfileType: 1 reduced, 4 a mask
+    if (tag == 256) page.width = value;
+    if (tag == 257) page.height = value;
   }
+  page.next =
+      static_cast<size_t>(number(bytes, directory + 2 + static_cast<size_t>(count) * 12, 4, big));
+  return page;
+}
+
+ImageHeader read_tiff(Bytes bytes) {
+  constexpr int kMostPages = 65536;  // the chain of a damaged file may be a circle
+  ImageHeader header;
+  const bool big = bytes[0] == 'M';
+  TiffPage page = read_tiff_page(bytes, static_cast<size_t>(number(bytes, 4, 4, big)), big);
+  header.width = page.width;
+  header.height = page.height;
+  for (int i = 0; i < kMostPages && page.next != 0 && page.next < bytes.size(); ++i) {
+    page = read_tiff_page(bytes, page.next, big);
+    header.has_more = header.has_more || (page.is_picture && page.width > 0);
+  }
+  return header;
+}
+
+// Only whether it has more pictures than one: the flag 2 of an extended file's first chunk.
+ImageHeader read_webp(Bytes bytes) {
+  ImageHeader header;
+  if (bytes.substr(12, 4) == "VP8X" && (number(bytes, 20, 1, false) & 2) != 0)
+    header.has_more = true;
   return header;
 }
 
@@ -129,6 +161,7 @@ ImageHeader read_image_header(std::string_view bytes) {
   if (starts_with(bytes, "BM")) return read_bmp(bytes);
   if (bytes[0] == 'P' && bytes[1] >= '1' && bytes[1] <= '6') return read_pnm(bytes);
   if (starts_with(bytes, {"II*\0", 4}) || starts_with(bytes, {"MM\0*", 4})) return read_tiff(bytes);
+  if (starts_with(bytes, "RIFF") && bytes.substr(8, 4) == "WEBP") return read_webp(bytes);
   return {};
 }
 

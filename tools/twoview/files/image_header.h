@@ -12,11 +12,12 @@ struct ImageHeader {
   int64_t width = 0, height = 0;  // 0 if unknown: another format, or cut within the header
   int64_t max_sample = 0;         // PNM: the sample that is white; 0 for other formats
   bool is_binary_pnm = false;     // P5 or P6
+  bool has_more = false;          // TIFF: pages but for previews and masks; PNG, WebP: animated
   bool truncated = false;         // the file ends early: PNG, JPEG, binary PNM
 };
 
-// Parses the headers of PNG, JPEG, BMP, PNM and TIFF. It never fails and never reads outside
-// `bytes`.
+// Parses the headers of PNG, JPEG, BMP, PNM and TIFF, and whether WebP is animated. It never fails
+// and never reads outside `bytes`.
 ImageHeader read_image_header(std::string_view bytes);
 
 }  // namespace cli

@@ -77,6 +77,7 @@ class ImageFolder : public FrameSource {
         if (picture.turn_deg == 0 && !picture.is_16bit) frame.file = file;
         frame.exif = picture.exif;
         has_stretched_ = has_stretched_ || picture.is_stretched;
+        has_more_ = has_more_ || picture.has_more;
       } catch (const BadInput& e) {
         frame.problem = e.what();
       }
@@ -120,6 +121,7 @@ class ImageFolder : public FrameSource {
     std::vector<std::string> notes = folder_.notes;
     if (!folder_.left_out.empty()) notes.push_back(left_out_words(folder_.left_out, folder_.path));
     if (has_stretched_) notes.push_back(kStretchedNote);
+    if (has_more_) notes.push_back(kMoreNote);
     if (turn_deg_ != 0)
       notes.push_back(is_turned_
                           ? "the pictures are turned as a viewer does (EXIF): the camera is of "
@@ -130,7 +132,7 @@ class ImageFolder : public FrameSource {
 
  private:
   Folder folder_;
-  bool has_stretched_ = false;
+  bool has_stretched_ = false, has_more_ = false;
   int turn_deg_ = 0;        // of a picture, by EXIF
   bool is_turned_ = false;  // the camera is of the pictures as a viewer turns them
 };

@@ -41,7 +41,8 @@ std::unique_ptr<FrameSource> open_stored_source(const std::string& path, double 
   }
   if (has_picture_ending(path) && fs::is_regular_file(path, error))
     throw BadInput("cannot read " + path +
-                   " as a film: it is one picture; give the folder of the pictures, and --fps");
+                   " as a film: it is one picture; give the folder of the pictures, and --fps "
+                   "(pages of a TIFF: each as a file)");
   if (fs::is_regular_file(path, error)) return open_film(path, fps);
   return nullptr;
 }

@@ -30,7 +30,8 @@ struct OwnMatchOptions {
 // Moves the pixels of `matches` to the two pictures as they are used, which may be smaller than
 // their files; `name` is the file of the matches. Throws BadInput that names the first match that
 // is not finite or not in its picture; for normalised coordinates; and, where `resize` is below 0,
-// for matches that leave so much of both pictures empty that they are of smaller ones.
+// for matches that leave so much of both pictures empty that they are of smaller ones; and where
+// the pictures look alike at the matches only with the sides exchanged.
 void fit_to_pictures(const Picture pictures[2], int resize, const std::string& name,
                      MatchList& matches);
 

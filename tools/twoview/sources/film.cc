@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "sources/film_container.h"
+#include "sources/joined_films.h"
 #include "sources/stream_clock.h"
 
 namespace cli {
@@ -139,6 +140,7 @@ Film::Film(const std::string& path, double fps) : state_(std::make_unique<State>
   s.facts.turn_deg = turn;
   s.facts.is_mirrored = s.container.is_mirrored;
   s.facts.pixel_aspect = s.container.pixel_aspect;
+  s.facts.is_joined = is_joined_film(path);
   s.facts.is_interlaced = s.container.is_interlaced;
   s.facts.clock_start_s = s.container.clock_start_s;
   s.facts.rate_hz = s.container.rate_hz;
@@ -219,6 +221,7 @@ std::vector<std::string> Film::notes() const {
     notes.push_back("the film's clock begins at " + text_of("%.6g", f.clock_start_s) +
                     " s; times here count from its first picture");
   if (f.is_interlaced) notes.emplace_back(kInterlacedNote);
+  if (f.is_joined) notes.emplace_back(kJoinedNote);
   if (s.container.num_picture_streams > 1)
     notes.push_back("the film has " + std::to_string(s.container.num_picture_streams) +
                     " streams of pictures: the first one is used");

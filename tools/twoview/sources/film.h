@@ -28,8 +28,12 @@ struct FilmFacts {
   int64_t num_left_out = 0;    // pictures whose time is not later than that of the one before
   int64_t num_begun_anew = 0;  // how often the clock began anew, as where two films are one file
   bool is_interlaced = false;  // by the container: the even and the odd rows may be of two moments
+  bool is_joined = false;      // other films follow in the file, which are not read
   double missing_s = 0;        // how much longer the film is by its header than by its pictures
 };
+constexpr const char* kJoinedNote =
+    "the file holds several films one behind the other (joined as bytes), of which the first is "
+    "read: give them one by one, or join them by ffmpeg -f concat";
 const char* times_name(FilmFacts::Times times);
 constexpr const char* kInterlacedNote =
     "the film is interlaced by its container: where its even and odd rows are of two moments, "

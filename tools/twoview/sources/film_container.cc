@@ -103,7 +103,10 @@ FilmContainer read_film_container(const std::string& path) {
   result.width = pictures->codecpar->width;
   result.height = pictures->codecpar->height;
   result.num_pictures = std::max<int64_t>(0, pictures->nb_frames);
-  result.has_clock = has_times(*film, *pictures);
+  // Of a raw stream, and of JPEG pictures in a zip, which it takes for one, libavformat may count
+  // times of its own.
+  const bool is_raw = (film->iformat->flags & AVFMT_NOTIMESTAMPS) != 0;
+  result.has_clock = !is_raw && has_times(*film, *pictures);
   result.rate_hz = positive(pictures->avg_frame_rate);
   if (!(result.rate_hz > 0)) result.rate_hz = positive(pictures->r_frame_rate);
   result.clock_start_s = seconds(pictures->start_time, pictures->time_base);

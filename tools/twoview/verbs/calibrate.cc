@@ -170,7 +170,7 @@ std::vector<BoardView> find_views(Arguments& a, cv::Size& image) {
     views.push_back(view);
   };
   if (a.video.empty())
-    read_images(a.images, take, leave_out);
+    for (const std::string& note : read_images(a.images, take, leave_out)) a.common.note(note);
   else if (live)
     read_live(a.video, a.duration_s, take);
   else

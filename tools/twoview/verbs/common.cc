@@ -54,6 +54,7 @@ void bring_to_size(Picture& picture, Common& common) {
                 std::to_string(picture.luma.rows) + " (--resize 0: as they are)");
   }
   if (picture.is_stretched) common.note(kStretchedNote);
+  if (picture.has_more) common.note(kMoreNote);
 }
 
 std::string watch_text(const Options& options) {

@@ -120,11 +120,12 @@ int undistort(Arguments& a) {
   const Progress progress(!common.quiet && a.images.size() > 1);
   std::vector<std::string> written;
   std::vector<LeftOut> left_out;
+  bool has_more = false;
   for (size_t i = 0; i < a.images.size(); ++i) {
     progress.tell(std::to_string(i + 1) + " of " + std::to_string(a.images.size()) + " images");
     cv::Mat image;
     try {
-      image = load_pixels(a.images[i]);
+      image = load_pixels(a.images[i], &has_more);
       fitted(whole, camera_name(a), image.cols, image.rows, a.images[i], false);
     } catch (const BadInput& e) {
       std::error_code ignored;
@@ -142,6 +143,7 @@ int undistort(Arguments& a) {
   }
   if (written.empty()) throw BadInput(left_out[0].reason);
   if (!left_out.empty()) common.note(left_out_note(left_out));
+  if (has_more) common.note(kMoreNote);
   if (a.mask) files.add("mask.png", png_bytes(map.seen));
   files.add("camera.yaml", camera_yaml(pinhole));
 

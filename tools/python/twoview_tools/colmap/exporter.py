@@ -27,7 +27,7 @@ from .database import (
 )
 from .engine import Engine, pixels_of
 from .errors import BadInput
-from .images import list_images, read_luma, shrunk
+from .images import MORE, holds_more, list_images, read_luma, shrunk
 from .masks import Masks, shrunk_mask
 from .pairs import exhaustive, read_pairs, sequential
 from .progress import progress
@@ -139,7 +139,7 @@ def _describe_images(job, pairs, engine, pictures):
     folders = [os.path.dirname(os.path.abspath(job.pairs))] if job.pairs else []
     folders += [job.images, os.path.dirname(os.path.abspath(job.images))]
     choice = CameraChoice(job.cameras, folders, job.focal_35mm)
-    views, left_out = {}, []
+    views, left_out, has_more = {}, [], False
     intrinsics = _intrinsics(job, pairs)
     for name, K in progress(intrinsics.items(), "image", job.quiet):
         path = os.path.join(job.images, name)
@@ -148,6 +148,7 @@ def _describe_images(job, pairs, engine, pictures):
         except BadInput as error:
             left_out.append((name, str(error).removeprefix(f"image {path}").lstrip(": ")))
             continue
+        has_more = has_more or holds_more(path)
         if job.resize is None and not views:
             _advise_on_size(name, luma)
         camera = choice.of(name, luma.shape[1], luma.shape[0], K)
@@ -158,8 +159,8 @@ def _describe_images(job, pairs, engine, pictures):
     words = left_out_words(left_out, job.images)
     if not any(pair.name0 in views and pair.name1 in views for pair in pairs):
         raise BadInput(f"no pair of images can be read: {words}")
-    if words:
-        print(f"twoview: note: {words}", file=sys.stderr)
+    for note in filter(None, (words, has_more and MORE)):
+        print(f"twoview: note: {note}", file=sys.stderr)
     return views
 
 

@@ -12,6 +12,9 @@ from .errors import BadInput
 
 EXTENSIONS = (".jpg", ".jpeg", ".jpe", ".png", ".bmp", ".pgm", ".ppm", ".pnm", ".pbm", ".tif",
               ".tiff", ".webp", ".jp2")
+#: the note on files of which holds_more is true
+MORE = ("there are files that hold several pictures (pages of a TIFF, frames of an animation): the "
+        "first of each is used")
 _BLOCK = 8  # pixels a side, over which the brightness of possible copies is averaged
 
 
@@ -108,6 +111,38 @@ def decode(path, keeps_depth=False):
     if image.ndim == 3 and image.shape[2] not in (3, 4):
         raise BadInput(f"image {path}: {image.shape[2]} channels, not 1, 3 or 4")
     return image
+
+
+def _tiff_pages(data):
+    """The number of a TIFF file's pages but for previews and masks."""
+    order = "big" if data[:1] == b"M" else "little"
+
+    def number(at, count):
+        return int.from_bytes(data[at:at + count], order)
+    pages, at, seen = 0, number(4, 4), set()
+    while at and at < len(data) and at not in seen:
+        seen.add(at)
+        count = number(at, 2)
+        values = {number(entry, 2): number(entry + 8, 2 if number(entry + 2, 2) == 3 else 4)
+                  for entry in range(at + 2, at + 2 + 12 * count, 12)}
+        # Tag 254, NewSubfileType: 1 is a reduced picture, 4 a mask; tag 256 is the width.
+        pages += not values.get(254, 0) & 5 and values.get(256, 0) > 0
+        at = number(at + 2 + 12 * count, 4)
+    return pages
+
+
+def holds_more(path):
+    """Whether a file holds more pictures than the one that is read: pages of a TIFF, frames of an
+    animated PNG or WebP. The rule is that of tools/twoview/files/image_header.cc."""
+    with open(path, "rb") as file:
+        head = file.read(4096)
+        if head[:4] in (b"II*\0", b"MM\0*"):
+            return _tiff_pages(head + file.read()) > 1
+        if head[:8] == b"\x89PNG\r\n\x1a\n":
+            at = head.find(b"acTL")
+            return at > 0 and int.from_bytes(head[at + 4:at + 8], "big") > 1
+        # Of an animated WebP the flag 2 of its first chunk, VP8X, is set.
+        return head[:4] == b"RIFF" and head[8:16] == b"WEBPVP8X" and bool(head[20] & 2)
 
 
 def shrunk_size(width, height, longer):
