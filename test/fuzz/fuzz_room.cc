@@ -160,14 +160,16 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       of_mesh.measured_only = bytes.whole(0, 1);
       if (bytes.whole(0, 1) == 0)
         for (int k = 0; k < 3; ++k) of_mesh.min[k] = bytes.wild(-1, 0), of_mesh.max[k] = 1;
-      // Planes that were found, perhaps before the room changed, and now and then any.
+      // Planes that were found, perhaps before the room changed, or one before the first camera.
+      if (num_planes == 0 && bytes.whole(0, 1) == 0) {
+        planes[0] = {};
+        planes[0].normal[2] = -1;
+        planes[0].offset = -bytes.wild(0.2, 3);
+        if (bytes.whole(0, 7) == 0) planes[0].normal[bytes.whole(0, 2)] = bytes.wild(-1, 1);
+        num_planes = 1;
+      }
       of_mesh.planes = planes;
       of_mesh.num_planes = bytes.whole(0, 3) == 0 ? 0 : num_planes;
-      if (num_planes > 0 && bytes.whole(0, 7) == 0) {
-        tv_room_plane& plane = planes[bytes.whole(0, num_planes - 1)];
-        plane.offset = bytes.wild(-3, 3);
-        for (double& value : plane.normal) value = bytes.wild(-1, 1);
-      }
       of_mesh.max_sigma = bytes.whole(0, 3) == 0 ? bytes.wild(0, 0.1) : 0;
       mesh_of(room, &of_mesh);
     }
