@@ -19,9 +19,9 @@ class Context:
     image. max_matches: the most matches of an estimate; 0 means max_keypoints. kernels: a Kernels.
     max_effort: the highest rung of effort, 0 to 3, to which reconstruct climbs. purposes: bits of
     Purpose for the calls that get memory, 0 for all; another call raises TV_ERR_LIMITS. library: a
-    Library in place of the package's own. Calls from several threads wait for each other; use one context for each
-    thread to run them at once. close() or a with statement frees the memory; later calls raise
-    ValueError.
+    Library in place of the package's own. Calls from several threads wait for each other; use one
+    context for each thread to run them at once. close() or a with statement frees the memory; later
+    calls raise ValueError.
     Raises TV_ERR_ARGUMENT for a limit out of its range, TV_ERR_KERNELS for kernels that this CPU
     does not have, ImportError where there is no library."""
 
