@@ -15,7 +15,8 @@ import cli_support as cli
 from cli_support import FOCAL, HEIGHT, WIDTH
 
 PAIR_KEYS = """name0 name1 rotation_error_deg translation_error_deg translation_error_signed_deg
-pose_error_deg num_matches num_inliers precision config verdict time_ms""".split()
+pose_error_deg num_matches num_inliers precision config verdict effort timings_ms
+time_ms""".split()
 K = [FOCAL, 0, (WIDTH - 1) / 2, 0, FOCAL, (HEIGHT - 1) / 2, 0, 0, 1]
 SIDEWAYS = [1, 0, 0, -1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]
 
@@ -57,6 +58,8 @@ class Evaluate(cli.CliTest):
         self.assertEqual([key for key in PAIR_KEYS if key in pair], PAIR_KEYS)
         self.assertLess(pair["pose_error_deg"], 0.5)
         self.assertGreater(pair["precision"], 0.9)
+        self.assertEqual((pair["effort"], len(pair["timings_ms"]["rungs"])), (0, 1))
+        self.assertEqual(report["options"]["effort"], "auto")
         self.assertEqual(
             pair["pose_error_deg"], max(pair["rotation_error_deg"], pair["translation_error_deg"])
         )
