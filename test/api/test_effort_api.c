@@ -304,7 +304,6 @@ static void test_no_two_matches_of_squeezed_views_are_of_one_place(void) {
 }
 
 /* Guided matching finds again, in other views, the places that are matched already. */
-/* Guided matching finds again, in other views, the places that are matched already. */
 static void test_guided_matches_of_squeezed_views_are_of_further_places(void) {
   int32_t rung, num_matches;
   draw_stair(7);

@@ -55,7 +55,6 @@ class Engine:
         except tv.StatusError as error:
             raise BadInput(str(error)) from None
 
-
     def climb(self, views):
         """tv.reconstruct with the engine's rungs, of two (luma, mask, camera). Keypoints stay where
         they were found. Returns (TwoView, Reconstruction)."""
