@@ -1,5 +1,5 @@
-// When and how the odometry moves the principal point (odometry/calibration.h, docs/odometry.md,
-// "The camera is corrected").
+// When and how the odometry moves the principal point (odometry/calibration.h,
+// docs/algorithms/odometry.md, "The camera's principal point").
 
 #include "odometry/calibration.h"
 

@@ -1,5 +1,5 @@
 // When the frames of a flight are "weak" because the map is in doubt (odometry/track.cc,
-// docs/odometry.md, "The map is checked").
+// docs/algorithms/odometry.md, "The map is checked").
 
 #include <unity.h>
 

@@ -248,7 +248,7 @@ tv_status tv_odometry_init(tv_odometry** odometry, const tv_camera* camera,
   o->given_camera = tv::prepare_camera(plan.camera).model;
   tv_feature_options_init(&o->features);
   o->features.max_keypoints = plan.options.max_keypoints;
-  // Measured on the sequences: docs/odometry.md.
+  // Measured on the sequences: docs/algorithms/odometry.md.
   o->features.arc = 9;
   o->features.cell_px = 32;
   o->grid_columns = plan.columns;

@@ -10,7 +10,7 @@ namespace {
 constexpr int32_t kLeastShared = 10;
 // The errors of a keypoint in successive keyframes are alike, so that the standard deviation is
 // this many times that of independent ones; and the map's scale drifts by this share from window to
-// window. Measured: docs/odometry.md.
+// window. Measured: docs/algorithms/odometry.md.
 constexpr double kCorrelation = 2, kDrift = 0.015;
 
 WindowSizes sizes_of(const tv_odometry_options& o) {

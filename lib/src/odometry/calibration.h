@@ -1,5 +1,6 @@
 // The principal point is moved where many pairs of keyframes agree that it lies elsewhere.
-// docs/odometry.md, "The camera is corrected". Tests: test/unit/test_odometry_calibration.cc.
+// docs/algorithms/odometry.md, "The camera's principal point". Tests:
+// test/unit/test_odometry_calibration.cc.
 #pragma once
 
 #include "odometry/odometry.h"

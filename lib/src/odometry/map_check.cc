@@ -6,7 +6,7 @@ namespace tv {
 namespace {
 
 // A map contradicts a pair whose turns differ by more than three standard deviations of the pair's
-// and this angle, in radians. Measured: docs/odometry.md.
+// and this angle, in radians. Measured: docs/algorithms/odometry.md.
 constexpr double kTurnSigmas = 3, kTurnAllowed = 0.026;
 constexpr int32_t kContradicting = 2;    // pairs that disagree
 constexpr int32_t kMostUnconfirmed = 3;  // keyframes in a row that no pair confirmed

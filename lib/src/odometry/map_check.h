@@ -1,5 +1,5 @@
-// The map is checked by pairs of keyframes, whose matches do not depend on it. docs/odometry.md,
-// "The map is checked". Tests: test/unit/test_map_check.cc.
+// The map is checked by pairs of keyframes, whose matches do not depend on it.
+// docs/algorithms/odometry.md, "The map is checked". Tests: test/unit/test_map_check.cc.
 #pragma once
 
 #include "odometry/pair.h"

@@ -1,4 +1,4 @@
-// The state of the odometry, which all its files work on. docs/odometry.md.
+// The state of the odometry, which all its files work on. docs/algorithms/odometry.md.
 #pragma once
 
 #include "base/arena.h"
