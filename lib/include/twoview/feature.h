@@ -72,8 +72,8 @@ typedef enum tv_normalisation {
 } tv_normalisation;
 
 /* Options of detection and description. Filled by tv_feature_options_init.
-   docs/decisions/0001-features.md and 0019-scale-and-spread.md have the measurements behind the
-   defaults. */
+   The measurements behind the defaults are in docs/decisions/0001-features.md and
+   docs/accuracy.md. */
 typedef struct tv_feature_options {
   /* The caller's sizeof, set by tv_feature_options_init. */
   uint32_t struct_size;
@@ -175,7 +175,7 @@ TV_API tv_status tv_extract(tv_context *context, const tv_image *image, const tv
    (size / size_of_one)^exponent, limited to [0.01, 1000].
    keypoints: num_keypoints; every field is checked as tv_describe checks it. size_of_one: (0,
    4096], best tv_feature_options.keypoint_size. exponent: [0, 2]; 0 gives 1 for all, 1 a noise in
-   proportion to the size; docs/decisions/0017-noise-by-level.md has what was measured.
+   proportion to the size; docs/decisions/0001-features.md has what was measured.
    sigmas: room for num_keypoints; gather them by the indices of the matches.
    Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_NOT_FINITE, TV_ERR_OVERLAP. Thread-safe. */
 TV_API tv_status tv_keypoint_sigmas(const tv_keypoint *keypoints, int32_t num_keypoints,

@@ -18,11 +18,11 @@ constexpr double kStepPerSize = 1.5 * 0.28;
 constexpr double kOrientStep = 1.5 / 4.0;
 
 // Samples of the descriptor are 1.12 to 2.24 pixels of their octave apart. Closer samples would be
-// blurred, and wider ones would alias (docs/decisions/0009).
+// blurred, and wider ones would alias (docs/decisions/0003-patch-sift.md).
 constexpr double kMaxStep = 2.24;
 
 // The histogram of a pooled descriptor is the mean over two windows: the keypoint's window scaled
-// by each of these factors (docs/decisions/0018).
+// by each of these factors (docs/decisions/0003-patch-sift.md).
 constexpr double kPooledSizes[2] = {0.7, 1.3};
 
 constexpr int32_t kBlock = TVK_QUANTIZED;  // keypoints

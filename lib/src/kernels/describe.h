@@ -3,8 +3,8 @@
    keypoints", IJCV 2004, sections 5 and 6. No arctangent is needed: a gradient between two
    directions of a histogram is the sum of a vector along each direction, and the lengths of these
    two vectors are its shares. Arithmetic is in integers, of 16 bits where these suffice
-   (docs/decisions/0009), except for the square roots and one division of the normalisation, which
-   are single IEEE operations. */
+   (docs/decisions/0003-patch-sift.md), except for the square roots and one division of the
+   normalisation, which are single IEEE operations. */
 
 #include "kernels/words.h"
 

@@ -10,7 +10,7 @@ namespace {
 
 constexpr int32_t kMostKeyframes = 256;
 // Of the older keyframes so many are held. With more of them the others have fewer observations,
-// and their covariance holds the truth less often (docs/decisions/0039).
+// and their covariance holds the truth less often (docs/decisions/0031-loops-adjusted-together.md).
 constexpr int32_t kHeldOneIn = 4;
 // Points are chosen until each keyframe sees its share of the observations divided by this: a point
 // that is chosen for one keyframe has observations in the others.

@@ -13,7 +13,7 @@ namespace {
 constexpr double kMostUncertain = 0.02, kFarthest = 0.05;
 constexpr int32_t kLeastPairs = 6;
 // Twice the gain in log-likelihood, in units of the scatter between pairs. Right cameras reach 25
-// (docs/decisions/0051).
+// (docs/decisions/0015-principal-point.md).
 constexpr double kLeastGain = 50;
 
 }  // namespace

@@ -1,6 +1,6 @@
 // How probable it is that a full pose is wrong, as a logistic model of the evidence. Its
 // coefficients are fitted on real pairs by scripts/belief --fit; the attempts and their figures are
-// in docs/decisions/0025-probability-wrong.md. Tests: test/unit/test_verdict.cc,
+// in docs/decisions/0007-verdict-and-covariance.md. Tests: test/unit/test_verdict.cc,
 // test/property/test_verdict_statistics.cc.
 #pragma once
 

@@ -53,7 +53,7 @@ bool pose_uncertainty(const RayPairs& pairs, const int32_t* indices, int count, 
 // By how much the variances grow because of wrong matches among the inliers. Where more than 30 per
 // cent of the matches are no inliers, those that happen to lie near the epipolar lines, or agree
 // with one another, turn the pose by more than their residuals tell: the third power of that share
-// over 0.3, at least 1. docs/decisions/0028-verdict-after-alignment.md.
+// over 0.3, at least 1. docs/decisions/0024-honest-covariance.md.
 double growth_by_disagreement(int num_inliers, int num_matches);
 
 // Like pose_uncertainty, for a pose that is fitted together with a plane (PlaneModel). Its

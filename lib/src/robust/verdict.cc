@@ -40,7 +40,7 @@ bool low_inlier_ratio(const Evidence& e) {
 // (docs/decisions/0007-verdict-and-covariance.md); or the direction's standard deviation, with the
 // errors that matches share, is above 13.5 degrees: by its own covariance it is then about as
 // likely as not off by more than 10 degrees (46 per cent where the error has one axis, 58 where it
-// has none; docs/decisions/0028-verdict-after-alignment.md).
+// has none; docs/decisions/0007-verdict-and-covariance.md).
 bool low_parallax(const Evidence& e) {
   constexpr double kMostSigma = 1.25 * kPi / 180, kMostDirectionSigma = 13.5 * kPi / 180;
   const double least_px = std::max(3 * e.threshold_px, 10 * e.noise_px);
@@ -55,7 +55,7 @@ bool low_parallax(const Evidence& e) {
 // one region is left out. All three leave part of the pose to be extrapolated. One image in which
 // the inliers are spread is enough, since its rays then constrain the pose: after a forward move or
 // a change of scale by 2 the other image's lie in a quarter of the area, and the pose is as
-// accurate (docs/decisions/0016-one-verdict.md).
+// accurate (docs/decisions/0007-verdict-and-covariance.md).
 bool crowded_matches(const Evidence& e) {
   const bool few_cells = e.num_inliers > 0 && coverage_of(e) < 4.5 / 64;
   const double nearest = std::min(e.line_distance_px[0], e.line_distance_px[1]);
@@ -68,7 +68,7 @@ bool crowded_matches(const Evidence& e) {
 // they do not contradict the direction would be another one by what counts as wrong, 10 degrees. A
 // smaller difference is in the covariance. So is one of the rotation: a turn while the rows are
 // read moves it by a degree or two, and more is asked for only by long lenses, which leave it open
-// (docs/decisions/0054-camera-contradicted.md).
+// (docs/decisions/0007-verdict-and-covariance.md).
 bool camera_contradicted(const Evidence& e) {
   return has_full_pose(e) && e.misfit_direction_rad > 10 * kPi / 180;
 }

@@ -1,6 +1,6 @@
 // The verdict and its reasons: what was measured of a pair, and what is decided from it. Verdict
 // and reasons are decided only here, and only from Evidence. They are the same when the views are
-// exchanged. docs/decisions/0016-one-verdict.md.
+// exchanged. docs/decisions/0007-verdict-and-covariance.md.
 #pragma once
 
 #include "robust/pair_evidence.h"

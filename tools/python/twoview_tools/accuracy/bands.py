@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What comparing descriptors of neighbouring bands alone would cost (docs/decisions/0033-bands.md).
+"""What comparing descriptors of neighbouring bands alone would cost (docs/decisions/refused.md).
 
   scripts/python -m twoview_tools.accuracy.bands              # every set, 5 pairs each
   scripts/python -m twoview_tools.accuracy.bands --weights    # the weights over all sets

@@ -83,7 +83,7 @@ SAME_PLACE = (frozenset(("kitti00_turn", "seq_kitti00_first200")),)
 # contradict the file. seq_chessboard_desk: its two coefficients come from a board in the middle of
 # the picture, and towards the right border the matches miss the true epipolar lines by 2.5 px in
 # the median. twoview_tools.accuracy.lens fits these on half of the frames and judges them on the
-# other half, where 0.7 px are left; docs/decisions/0028-verdict-after-alignment.md.
+# other half, where 0.7 px are left; docs/decisions/0007-verdict-and-covariance.md.
 LENSES = {"seq_chessboard_desk": (-0.28139, 0.08175, -0.00056, -0.00107, -0.01075)}
 # Sets whose true poses are exact for the purpose: laser-scanned, or rendered.
 EXACT = ("strecha_Herz_Jesus_P8", "strecha_fountain_P11", "seq_icl_of_kt3", "seq_parking",

@@ -64,18 +64,9 @@ def on_files(files, config):
 
 
 def decisions():
-    lines = [
-        "# Decisions",
-        "",
-        "Why things are as they are: a page each, the alternatives, and the number that decided.",
-        "",
-    ]
-    for path in sorted((ROOT / "docs" / "decisions").glob("*.md")):
-        title = (
-            path.read_text().split("\n")[0].removeprefix("# ").removeprefix(f"{path.name[:4]}: ")
-        )
-        lines.append(f"- {path.name[:4]}: [{title[0].upper()}{title[1:]}](decisions/{path.name})")
-    return "\n".join(lines) + "\n"
+    """The table of the decisions, as the page decisions.md."""
+    text = (ROOT / "docs" / "decisions" / "README.md").read_text()
+    return re.sub(r"\]\((\w[\w-]*\.md)", r"](decisions/\1", text)
 
 
 def on_page_markdown(markdown, page, config, files):

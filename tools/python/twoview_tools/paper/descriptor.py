@@ -271,7 +271,7 @@ EXPERIMENTS = [
         "image: "
         "the number of samples no longer grows with the keypoint, and shares between directions "
         "need "
-        "no arctangent (docs/decisions/0003-patch-sift.md, 0009-descriptor-speed.md). The bytes "
+        "no arctangent (docs/decisions/0003-patch-sift.md). The bytes "
         "stay "
         "comparable with OpenCV's and COLMAP's: median cosine 0.99 with OpenCV's SIFT. Our default "
         "is "
