@@ -7,7 +7,7 @@
 
 #include "session_impl.h"
 
-static const int64_t WAIT_NS = 150 * MS;  /* how long a sample waits for what follows it */
+static const int64_t WAIT_NS = 150 * MS;  /* how long a sample waits for its later neighbour */
 static const int64_t ALIVE_NS = 400 * MS; /* a quantity that is older no longer comes */
 static const int64_t VELOCITY_GAP_NS = 250 * MS, HEIGHT_GAP_NS = 500 * MS;
 static const int64_t CHOICE_NS = 1 * SECOND; /* how long heights are listened to before a choice */

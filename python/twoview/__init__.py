@@ -64,7 +64,7 @@ def version_string() -> str:
 
 if not _typing.TYPE_CHECKING:  # or a type checker would accept every unknown name
     def __getattr__(name: str) -> str:
-        if name == "__version__":  # asked of the library, which is loaded at its first use
+        if name == "__version__":  # from the library, which is loaded at its first use
             return version_string()
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 

@@ -44,7 +44,7 @@ class OdometryState:
     noise_px: float  #: of a pixel of sigma 1, one standard deviation
     scale_source: ScaleSource  #: where the unit of lengths comes from
     scale_sigma: Optional[float]  #: relative; None where the unit is not the metre
-    principal_point_shift_px: np.ndarray  #: (2,), from where the camera has it; zeros: not moved
+    principal_point_shift_px: np.ndarray  #: (2,), x and y; zeros: it was not moved
     scale_contradicted: bool  #: heights and velocities contradict each other: there is no metre
     height_scale: Optional[tuple[float, float]]  #: metres per unit, and sigma, by heights alone
     velocity_scale: Optional[tuple[float, float]]  #: the same by velocities alone

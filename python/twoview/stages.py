@@ -315,7 +315,7 @@ class TwoView(Record):
     #: thousand where they are right. None where one camera did not take both views, the kind is
     #: not CALIBRATED, or the matches do not determine a shift; so are the next two.
     principal_point_chi2: Optional[float]
-    #: (2,), the shift in pixels that the matches ask for, which is not applied
+    #: (2,), the shift in pixels with which the residuals are least; it is not applied
     principal_point_asked_px: Optional[np.ndarray]
     principal_point_asked_covariance: Optional[np.ndarray]  #: (2, 2), pixels squared
     #: [0, 1], that the rotation is off by more than 5 degrees; calibrated on real pairs. 1 where

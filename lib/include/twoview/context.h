@@ -76,7 +76,7 @@ typedef struct tv_limits {
   /* Bits of tv_purpose: the calls that the context has memory for; 0 (default) means all of them.
      Fewer purposes need less memory. */
   uint32_t purposes;
-  /* The highest rung of effort that tv_reconstruct may be asked for
+  /* The highest rung of effort that tv_reconstruct may climb to
      (tv_reconstruct_options.effort and max_effort), [0, 3]; 0 (default): none but rung 0. The
      context then has memory for the keypoints of these rungs, at most 6.5 max_keypoints of an
      image, and as many may be given to tv_match and tv_match_guided. It counts only with

@@ -26,7 +26,7 @@ typedef struct tv_odometry tv_odometry;
 typedef enum tv_odometry_status {
   /* There is no map yet: the frames so far do not determine one. The pose is not known. */
   TV_ODOMETRY_STARTING = 0,
-  /* The pose was estimated from points of the map, and nothing speaks against it. */
+  /* The pose was estimated from points of the map, and nothing is evidence against it. */
   TV_ODOMETRY_TRACKING = 1,
   /* The pose was estimated, and `reasons` says why it may be wrong. */
   TV_ODOMETRY_WEAK = 2,
@@ -203,7 +203,7 @@ typedef struct tv_odometry_state {
   double principal_point_shift_px[2];
   /* The metres of one unit of the segment as heights alone and velocities alone say, each with its
      standard deviation: about 1 in a map in metres; zeros where nothing is known, or where it was
-     saved with the map, whose sensors are not told apart. */
+     saved with the map, which does not keep the two sensors apart. */
   double height_scale, height_scale_sigma, velocity_scale, velocity_scale_sigma;
   /* The share of the picture, [0, 1], that was found to stand still while the scene moves
      (on-screen text, a frame, a watermark, the vehicle's own legs), and of which the next frame
@@ -270,8 +270,8 @@ TV_API tv_status tv_odometry_camera(const tv_odometry *odometry, tv_camera *came
 TV_API tv_status tv_odometry_still_mask(const tv_odometry *odometry, uint8_t *mask,
                                         size_t cap_bytes);
 
-/* Does what tracking left for the frames to come: the adjustment of the newest keyframe, and what a
-   closed loop asks of the rest of the map. To be called after the last frame, before poses,
+/* Does what tracking left for the frames to come: the adjustment of the newest keyframe, and, after
+   a closed loop, that of the rest of the map. To be called after the last frame, before poses,
    keyframes, points or the map's bytes are read. Frames may follow all the same; without such work
    the map stays as it is.
    Returns TV_ERR_NULL. Time: bounded by the options; after a loop some tenths of a second. */

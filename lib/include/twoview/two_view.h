@@ -280,8 +280,8 @@ typedef struct tv_two_view {
      Wrong matches and repeated structure are evidence, too: only a shift that many pairs agree on
      is that of the camera. */
   double principal_point_chi2;
-  /* The shift of (cx, cy), in pixels, that the matches ask for, without a prior. It is not
-     applied. */
+  /* The shift of (cx, cy), in pixels, with which the matches' residuals are least, without a
+     prior. It is not applied. */
   double principal_point_asked_px[2];
   /* The covariance of principal_point_asked_px, in pixels^2: of x, of x and y, of y. */
   double principal_point_asked_covariance[3];

@@ -173,7 +173,7 @@ typedef struct tv_window_result {
   /* 1 where the gain that is left is at most `tolerance` of the cost, or where no step, however
      short, lowers it; else 0. */
   uint8_t converged;
-  /* 1 where the covariances were asked for and computed; 0 where they were not, or where the window
+  /* 1 where covariances were requested and computed; 0 where they were not, or where the window
      does not determine them. */
   uint8_t has_covariance;
   /* 1 where no view is fixed and no view has a pose prior or a gravity prior: the first view that
@@ -192,7 +192,7 @@ typedef struct tv_window_result {
   double initial_rms_px, rms_px;
   /* The standard deviation of an observation of sigma 1 along one axis, estimated from the
      residuals and robust as the loss is (Huber 1981), in pixels. 0 where the observations are too
-     few, or where no covariances were asked for. */
+     few, or where no covariances were requested. */
   double noise_px;
 } tv_window_result;
 
@@ -210,8 +210,8 @@ TV_API tv_status tv_adjust_window_size(const tv_window *window, size_t *size_byt
 
 /* Minimises the sum of rho over the observations and of the terms of the priors, over the poses of
    the views that are not fixed and over the points, by the Levenberg-Marquardt method with the
-   points eliminated (the Schur complement). A point whose pixels ask for a place beyond infinity
-   ends at 1e6 times the distance between the views that see it.
+   points eliminated (the Schur complement). A point whose rays diverge, so that no finite place
+   fits, ends at 1e6 times the distance between the views that see it.
    The distance between a pixel and the image of its point is measured in pixels, with the lens
    model linearised at the pixel: exact for TV_CAMERA_PINHOLE, to first order in the distance for
    the other models.

@@ -43,7 +43,7 @@ struct Results {
   uint8_t* aligned;
   // The cameras of the two views, corrected by the present estimate; set for full poses only.
   tv_camera cameras[2];
-  tv_pixel_pairs pairs;  // of the present matches; with sigmas where the option asks for them
+  tv_pixel_pairs pairs;  // of the present matches; with sigmas where sigma_by_size is not 0
   float keypoint_size;   // of sigma 1
   double sigma_by_size;  // the option
 };

@@ -20,8 +20,8 @@ inline Arena arena_over(void* memory, size_t size_bytes) {
   return Arena{static_cast<uint8_t*>(memory), size_bytes, 0, 0};
 }
 
-// Has no memory, and all that is asked of it: after a function that takes arrays from it and does
-// not touch them, used_bytes are those that they need.
+// An arena without memory that grants every request: after a function that takes arrays from it,
+// and does not touch them, used_bytes is how many bytes these arrays need.
 inline Arena measuring_arena() { return arena_over(nullptr, SIZE_MAX); }
 
 // The bytes that arena_alloc takes for `count` elements of T, padding included. Size queries add

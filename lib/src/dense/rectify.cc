@@ -167,7 +167,7 @@ bool range_of(const ParallaxHint& hint, const Camera& camera0, const DenseGrid& 
     *range = {hint.least, hint.most};
     if (grid.is_flat) {
       is_held = hint.most <= kFlatParallax;
-      // At the middle an angle gives the least parallax, at the rim the most.
+      // On a flat grid the same angle is the least parallax at the middle, and the most at the rim.
       double sine, cosine;
       sincos(std::min(hint.least, 1.0), &sine, &cosine);
       *range = {sine, 0};
@@ -303,8 +303,8 @@ void halve(const DenseGrid& grid, double pixel_angle, Arena& arena, DenseView* v
   view->image = tv_image{to, width, height, width};
 }
 
-// ---- Track: the pixel along a row is smooth, so the lens model is asked at every kSpan-th column,
-// and a cubic through four of these nodes serves the columns between the middle two.
+// ---- Track: the pixel along a row is smooth, so the lens model is evaluated at every kSpan-th
+// column, and a cubic through four of these nodes serves the columns between the middle two.
 
 namespace {
 

@@ -22,7 +22,7 @@ enum {
   TVK_DENSE_NEVER = 200, /* above every cost of a path */
   TVK_DENSE_REACH = 3,   /* cells around the middle of a window of least squares */
   TVK_DENSE_SUMS = 10,   /* of such a window */
-  TVK_DENSE_NODES = 8,   /* columns between two at which the lens model is asked */
+  TVK_DENSE_NODES = 8,   /* columns between two at which the lens is evaluated */
   TVK_DENSE_SPAN = 16,   /* columns of a block of cells */
   TVK_SWEEP_ACROSS = 4,  /* pixels of the map around the middle of a census of words */
   TVK_SWEEP_DOWN = 3,

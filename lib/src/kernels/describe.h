@@ -79,7 +79,7 @@ static direction_shares share_directions(words u, words v, words weights) {
   b = b + words_scale(small, words_of(8258));
   a = words_scale(a, weights);
   b = words_scale(b, weights);
-  /* The number is counted from u so far. u is 45 degrees from x, which is four bins. */
+  /* So far bins are counted from the direction u, which is 45 degrees, or four bins, from x. */
   shares.bin = (interval + words_of(4)) & words_of(TVK_ORIENT_BINS - 1);
   swapped = (a ^ b) & is_odd;
   shares.low = a ^ swapped;

@@ -56,8 +56,8 @@ static void make_rows(const tvk_descriptors *rows, int32_t first, int32_t place,
   }
 }
 
-/* Asks for the descriptor of a rank before it is read: ranks that follow each other may be anywhere
-   in the set, and half of prepare_descriptor's time was waiting for them. */
+/* Prefetches the descriptor of a rank: ranks that follow each other may be anywhere in the set, and
+   half of prepare_descriptor's time was waiting for them. */
 static inline void prefetch_ranked(const tvk_descriptors *set, int32_t rank) {
   const uint8_t *const bytes = ranked(set, rank);
   if (!bytes) return;

@@ -343,7 +343,7 @@ double chance_of(const Finish& f, const Pose& pose, uint64_t seed) {
 double largest_sigma(const Candidate& c, double distance) {
   double rotation = 0, position = 0;
   for (int k = 0; k < 3; ++k) {
-    // The camera's centre moves by -d + w x t.
+    // With the pose's change (w, d), the camera's centre, in its own axes, moves by -d + w x t.
     const int a = (k + 1) % 3, b = (k + 2) % 3;
     double row[6] = {};
     row[a] = c.pose.t[b];

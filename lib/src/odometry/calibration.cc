@@ -8,8 +8,8 @@
 namespace tv {
 namespace {
 
-// In focal lengths: a pair that determines the principal point no better than this, or asks for a
-// place farther away, is no evidence; nor is it moved farther.
+// In focal lengths. A pair counts as evidence where the standard deviation of its shift is at most
+// kMostUncertain and the shift at most kFarthest; the principal point is moved no farther, either.
 constexpr double kMostUncertain = 0.02, kFarthest = 0.05;
 constexpr int32_t kLeastPairs = 6;
 // Twice the gain in log-likelihood, in units of the scatter between pairs. Right cameras reach 25

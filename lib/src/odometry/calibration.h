@@ -8,7 +8,7 @@
 
 namespace tv {
 
-// Adds what the matches of a pair ask for, if they determine it.
+// Adds the shift of the principal point that fits a pair's matches best, if they determine it.
 void add_evidence(const tv_two_view& view, double focal_px, CameraEvidence* evidence);
 
 // Takes the pixel `to` as the principal point from now on, and turns the keyframes from this place

@@ -81,7 +81,7 @@ void count_inliers(const Pose& pose, const FrameMatches& matches, PoseFit* fit) 
   write_pose(s, pose, fit->cam_from_world.R, fit->cam_from_world.t);
 }
 
-// Searches the pose in max_iterations, unless that is 0: then it is known. Refines it if asked to.
+// Searches the pose in max_iterations; with 0, *fit holds it already. Refines it if `refines`.
 bool fit_matches(Odometry* odometry, int32_t max_iterations, bool refines, double max_error_px,
                  Frame* frame, PoseFit* fit) {
   ArenaScope scope(odometry->scratch);

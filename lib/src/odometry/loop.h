@@ -27,8 +27,8 @@ bool is_jump(Odometry* odometry, const Rigid& before, int32_t keyframe);
 // for a loop.
 bool is_plausible(const Odometry& odometry, const Frame& frame, double path, const LoopEnd& end);
 
-// Whether a loop that few points speak for agrees with the last such loop, of which it takes the
-// place. `frame` has its pose.
+// Whether a loop with few inliers, or with a large correction, agrees with the last such loop,
+// whose place it takes. `frame` has its pose.
 bool is_seen_twice(Odometry* odometry, const Frame& frame, const LoopEnd& end);
 
 // Whether a loop closes: at once, or together with another one that agrees. `path`: the length of
@@ -48,9 +48,9 @@ bool close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const 
 // Whether a closed loop is still to be spread over the keyframes of its segment.
 bool is_spreading(const Odometry& odometry);
 
-// One more step towards what the newest keyframes ask for together after a loop (at least a
-// hundred), and after the last one what all points do. `frame`, whose pose is relative to the
-// reference keyframe, moves with it.
+// One more step of the adjustment after a loop: first of the newest keyframes together (at least a
+// hundred), then of the points alone. `frame`, whose pose is relative to the reference keyframe,
+// moves with it.
 void spread_loop(Odometry* odometry, Frame* frame);
 
 // Looks for the segments of the keyframes from number `first` on in the keyframes before it. Those

@@ -125,8 +125,8 @@ int32_t find_keyframe(const Map& map, int32_t id);
 // The index of the first keyframe whose id is at least this one; num_keyframes where there is none.
 int32_t first_from(const Map& map, int32_t id);
 
-// A set of points that passes over the map build up and ask for: a bit each, because they go
-// through all keypoints of all keyframes.
+// A set of the map's points, a bit each: passes over all keypoints of all keyframes mark points in
+// it and look them up.
 void clear_marks(Map* map);
 inline void mark_point(Map* map, int32_t point) {
   map->marks[1 + (point >> 5)] |= uint32_t{1} << (point & 31);

@@ -75,7 +75,7 @@ void measure_depths(const MapWindow& window, Odometry* odometry) {
   Map& map = odometry->map;
   for (int32_t k = 0; k < window.model.num_points; ++k) {
     MapPoint& point = map.points[window.places[k]];
-    point.depth_sigma = 0;  // here: the largest squared sine
+    point.depth_sigma = 0;  // holds the largest squared sine until the last loop below
   }
   double centre[3];
   for (int32_t n = 0, view = -1; n < window.model.num_observations; ++n) {

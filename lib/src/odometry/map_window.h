@@ -22,7 +22,7 @@ struct MapWindow {
   int32_t* numbers;  // of each place in the map: its point here, or -1
   tv_observation* observations;
   int32_t* keypoints;            // of each observation
-  double* planes;                // two of each observation, as adjust_window takes them
+  double* planes;                // x, y on the plane z = 1 of each observation, or NaN
   tv_gravity_prior* gravity;     // room for one of each view
   tv_distance_prior* distances;  // as many
   float* errors;                 // of each observation, in pixels, after the adjustment

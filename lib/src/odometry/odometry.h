@@ -87,11 +87,11 @@ struct Reach {
   double most_m;
 };
 
-// What pairs of keyframes ask for: the normal equation of the shift of the principal point, in
-// pixels, information shift = product, and the sum of the pairs' own shifts in that metric.
+// The evidence of pairs of keyframes about the principal point: the normal equation of its shift in
+// pixels, information shift = product, and the sum of the pairs' own squared shifts in that metric.
 struct CameraEvidence {
   int32_t num_pairs;
-  int32_t next_num;  // of pairs with which the point is moved again; 0: it was not moved yet
+  int32_t next_num;  // how many pairs the next move needs; 0: it was not moved yet
   double information[3], product[2], square;
 };
 

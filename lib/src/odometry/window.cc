@@ -244,7 +244,7 @@ void hold_free_parameters(const Window& window, bool scale_is_free) {
 void write_covariances(const Window& window, int held, double scale, double* covariances) {
   const BlockMatrix& A = window.system;
   const int size = kBlock * window.num_blocks;
-  double* columns = A.panel;  // as large as six columns
+  double* columns = A.panel;  // scratch: the panel has room for six columns
   for (int v = 0; v < window.given.num_views; ++v) {
     const int block = window.block[v];
     if (block < 0 || v == held) continue;

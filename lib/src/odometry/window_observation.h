@@ -78,7 +78,7 @@ struct LinearObservation {
 };
 static_assert(sizeof(LinearObservation) == 9 * sizeof(double), "as kernels/odometry.h says");
 
-// Writes all but x. The point is in front of the camera.
+// Fills *out from out->x, the point, which must be in front of the camera.
 inline void linearise(const tv_window_options& options, const LossCurvature& curvature,
                       const WindowObservation& o, LinearObservation* out) {
   out->residual = {};

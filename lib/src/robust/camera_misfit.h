@@ -7,9 +7,9 @@
 
 namespace tv {
 
-// Tests whether the listed matches contradict the cameras: whether their residuals ask for a turn
+// Tests whether the listed matches contradict the cameras: whether their residuals fall with a turn
 // of each camera while its rows were exposed one after another and, where one camera saw both
-// views, for another principal point, with the prior that options.readout_turn_sigma_rad gives.
+// views, with another principal point, with the prior that options.readout_turn_sigma_rad gives.
 // Where they do, the pose's covariance grows by the step that the pose would take, as a deviation,
 // and by what the priors leave open of it. pose: of least loss over the listed matches. Writes
 // *misfit.

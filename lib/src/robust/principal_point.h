@@ -13,8 +13,8 @@ struct PrincipalPoint {
   bool is_free = false;         // whether the principal point is refined with the pose
 };
 
-// The test of a principal point that is where the calibration has it, and the shift that the
-// matches alone ask for; zeros where they do not determine it. In pixels.
+// The test of a principal point that is where the calibration has it, and the shift with
+// which the matches' residuals are least; zeros where they do not determine it. In pixels.
 struct PrincipalPointTest {
   double chi2 = 0;  // of two degrees of freedom: -2 log of the probability of as much evidence
   double asked_px[2] = {0, 0};

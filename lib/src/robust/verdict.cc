@@ -67,7 +67,7 @@ bool crowded_matches(const Evidence& e) {
 // CAMERA_CONTRADICTED: the matches contradict the cameras as they were given, and with cameras that
 // they do not contradict the direction would be another one by what counts as wrong, 10 degrees. A
 // smaller difference is in the covariance. So is one of the rotation: a turn while the rows are
-// read moves it by a degree or two, and more is asked for only by long lenses, which leave it open
+// read moves it by a degree or two, and only long lenses show more, because they leave it open
 // (docs/decisions/0007-verdict-and-covariance.md).
 bool camera_contradicted(const Evidence& e) {
   return has_full_pose(e) && e.misfit_direction_rad > 10 * kPi / 180;

@@ -165,9 +165,9 @@ void vote_beyond(const tv_room& room, const RoomView& view, const InferRequest& 
   }
 }
 
-// Whether the region may be a part of the plane. What was measured on it speaks for it, and what
-// was measured farther away against it, because that was seen through it; what is nearer may stand
-// before it.
+// Whether the region may be a part of the plane. What was measured on the plane is evidence for it,
+// and what was measured beyond it evidence against it, because it was seen through the plane; what
+// is nearer may stand before it.
 bool may_be_of(const Votes& votes, int32_t plane) {
   const int32_t on = votes.on[plane];
   return on >= kLeastVotes && on >= kLeastShare * votes.edge &&

@@ -138,7 +138,7 @@ def _is_number(text):
 # ---- arrays --------------------------------------------------------------------------------------
 
 class _Arrays:
-    """The arrays of a .npz, each read when it is asked for."""
+    """The arrays of a .npz, each read when it is first used."""
 
     def __init__(self, archive, name):
         self.archive, self.name, self.used = archive, name, set()

@@ -18,7 +18,7 @@ struct VehicleAddress {
   std::string camera = "0";    // a name of CameraSource
   double camera_delay_ms = 0;  // from the exposure to the receipt of a picture
   int system = 0;              // the vehicle's system id; 0: the first autopilot heard
-  EstimateOptions estimates;   // what it is told of the path
+  EstimateOptions estimates;   // which estimates of the path it is sent
 
   bool given() const { return !address.empty(); }
 };

@@ -60,8 +60,8 @@ constexpr const char* kMoreNote =
 // BadInput like load_picture. has_more, if given: set where the file holds more pictures than this.
 cv::Mat load_pixels(const std::string& path, bool* has_more = nullptr);
 
-// What a picture of a format that is not read is and what to do about it, such as "is a HEIC
-// picture, which is not read: convert it to JPEG"; empty for what is none of HEIC, AVIF and GIF.
+// For the bytes of a HEIC, AVIF or GIF picture, which are not read: what it is and what to do, such
+// as "is a HEIC picture, which is not read: convert it to JPEG". Empty for any other bytes.
 std::string unread_picture(std::string_view bytes);
 // The same of a file; empty if it cannot be read.
 std::string unread_picture_file(const std::string& path);

@@ -21,7 +21,8 @@ class MatchFolder {
   // one would serve two pairs.
   MatchList matches_of(const std::string& name0, const std::string& name1, std::string* name);
 
-  // The path, in the folder, of a pair's file; *is_exchanged: it is of the other order.
+  // The path within the folder of the file with a pair's matches. *is_exchanged: whether the file
+  // is named after the pair in the other order.
   std::string file_of(const std::string& name0, const std::string& name1, bool* is_exchanged);
 
  private:

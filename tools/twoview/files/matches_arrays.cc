@@ -48,7 +48,7 @@ const Names kRows = {"matches", "correspondences", "corrs", "arr_0"};
 // kornia's LoFTR calls matched pixels keypoints; only with this array they are.
 const std::string kBatches = "batch_indexes";
 
-// The arrays of a file, each read when it is asked for.
+// The arrays of a file, each read when it is first used.
 class Arrays {
  public:
   Arrays(std::string_view bytes, const std::string& name) : name_(name) {

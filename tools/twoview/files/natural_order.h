@@ -15,11 +15,12 @@ namespace cli {
 // tools/python/twoview_tools/folders.py is its twin; both run the cases of test/formats/names.json.
 bool comes_before(std::string_view a, std::string_view b);
 
-// Sorts the names of a sequence's pictures, which may be numbers with a sign or a fraction. Name by
-// name that cannot be told (t-1 is no negative number, and 1.10 may be the tenth or 1.1), of all of
-// them it can: where they differ in one number only, which has a fraction of several lengths that
-// never ends in 0, as programs print times (0.5, 0.53333), its fraction counts as decimals; and
-// where that number begins each name, a minus before it is its sign. Else as comes_before.
+// Sorts the names of a sequence's pictures, which may be numbers with a sign or a fraction. A
+// single name does not decide that (t-1 is no negative number, and 1.10 may be the tenth or 1.1),
+// but all of them do: where they differ in one number only, which has a fraction of several
+// lengths that never ends in 0, as programs print times (0.5, 0.53333), its fraction counts as
+// decimals; and where that number begins each name, a minus before it is its sign. Else as
+// comes_before.
 void sort_sequence(std::vector<std::string>& names);
 
 // The whole number that alone differs between the names, of each name; empty where they differ

@@ -22,7 +22,7 @@ struct FilmLens {
   double focal_35mm() const { return focal_35mm_of(lens.focal_px, width, height); }
   // The key focal_length of result.json.
   nlohmann::ordered_json json() const;
-  // "27.3 mm (35 mm equivalent) +- 0.5 %", with the coefficients where a map told them.
+  // "27.3 mm (35 mm equivalent) +- 0.5 %", with the coefficients where a map determined them.
   std::string words() const;
 };
 
@@ -31,8 +31,9 @@ inline constexpr const char* kDoubtfulFocalAdvice =
     "turn while you move, give --focal-35mm where you know it, or calibrate the camera "
     "(twoview calibrate)";
 
-// Runs the source up to four times; it must be able to. `options` are those of the flight that is
-// to follow. `progress` is told in words what is done. Throws BadInput as Flight does.
+// Runs the source up to four times, so that a live source does not serve. `options` are those of
+// the flight that is to follow. `progress` is called with a sentence on each step. Throws BadInput
+// as Flight does.
 FilmLens estimate_film_lens(FrameSource& source, const FlightOptions& options,
                             const std::atomic<bool>& stop,
                             const std::function<void(const std::string&)>& progress);

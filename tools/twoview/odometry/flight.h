@@ -41,7 +41,7 @@ struct FlightFrame {
   Pose live;
   int32_t reference_id = -1;
   Pose reference_from_cam;
-  // In the last state of the map.
+  // The pose in the last state of the map, and how it was found; segment -1: none.
   PoseOrigin origin = PoseOrigin::kNone;
   int32_t segment = -1;
   Pose pose;
@@ -66,8 +66,8 @@ std::vector<FlightKeyframe> keyframes_of(const tv_odometry* odometry, int32_t ma
 // How many segments the keyframes are in: fewer than were begun where some were joined or removed.
 int count_segments(const std::vector<FlightKeyframe>& keyframes);
 
-// Fills the covariances of the keyframes, which are all of the odometry's map in their order. It
-// takes about as long as an adjustment each.
+// Fills the covariances of the keyframes, which must be those of the odometry's whole map, in
+// order. Each takes about as long as an adjustment.
 void add_covariances(tv_odometry* odometry, std::vector<FlightKeyframe>& keyframes);
 
 using Rgb = std::array<uint8_t, 3>;
@@ -183,7 +183,7 @@ class Flight {
   size_t context_bytes_ = 0;
   tv_odometry* odometry_ = nullptr;
   tv_odometry_state state_;
-  std::optional<tv_odometry_state> told_;  // the last one that the source was told
+  std::optional<tv_odometry_state> told_;  // the last one that was passed to the source
   std::vector<FlightFrame> frames_;
   cv::Mat picture_;
   cv::Mat still_mask_;

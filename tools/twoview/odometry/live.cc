@@ -67,7 +67,7 @@ struct LivePage::State {
   MHD_Daemon* daemon = nullptr;
   std::atomic<uint16_t> port{0};
   std::atomic<uint64_t> asked_ns{0};
-  // What the page asks for. Hold the mutex while reading or writing it.
+  // What the page fetches. Hold the mutex while reading or writing it.
   std::mutex mutex;
   std::string data = "{\"status\":\"waiting\"}", picture;
   // Of the thread that tracks.

@@ -33,7 +33,7 @@ struct FlightResult {
   LiveStretch live_stretch;
   bool has_truth = false;
   Trajectory truth;
-  // On the truth's times, and on its rotations; empty where there is nothing to say.
+  // Notes on the times and on the rotations of the truth; empty where nothing was odd.
   std::string truth_note, rotation_note;
   Accuracy accuracy, live_accuracy;  // of the segment, and of that stretch
   nlohmann::ordered_json json;

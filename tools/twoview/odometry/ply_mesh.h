@@ -9,7 +9,7 @@ namespace cli {
 
 // Reads x y z of the element `vertex` and the lists vertex_indices (or vertex_index) of the element
 // `face`; faces of more than three corners are cut into triangles. Other elements and properties
-// are read over. Throws BadInput for what is no PLY file, has no faces, or is truncated or damaged.
+// are skipped. Throws BadInput for what is no PLY file, has no faces, or is truncated or damaged.
 TriangleMesh load_ply_mesh(const std::string& path);
 
 }  // namespace cli

@@ -1,5 +1,5 @@
 // What many pairs of one camera say together about its principal point. One pair proves little:
-// wrong matches and repeated structure are evidence, too, but they ask for another shift each time.
+// wrong matches and repeated structure shift it, too, but each time to another place.
 #pragma once
 
 #include <optional>

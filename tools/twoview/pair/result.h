@@ -42,7 +42,7 @@ struct Outcome {
   // Its arrays are in the context's memory until its next call, or in `own`.
   tv_reconstruction reconstruction{};
   OwnArrays own;
-  std::optional<std::vector<tv_dense_point>> dense;  // empty: not asked for, or no full pose
+  std::optional<std::vector<tv_dense_point>> dense;  // empty without --dense or a full pose
   std::optional<MetricScale> scale;  // empty: outputs are in baselines, else in metres
   nlohmann::ordered_json json;       // the content of result.json
   std::vector<std::string> notes;    // what the program decided by itself, for the report

@@ -11,7 +11,8 @@
 namespace cli {
 namespace {
 
-constexpr size_t kDense = 8000;  // points of a cloud whose points need no dark rim to be told apart
+// A cloud of so many points or more is drawn with smaller points, without a dark rim.
+constexpr size_t kDense = 8000;
 
 struct Range {
   double low = 0, high = 1;

@@ -24,7 +24,8 @@ class KnownPixels {
   // distance, sigma: `count` each, 0 where unknown. rgb: three times as many bytes.
   KnownPixels(const std::vector<float>& distance, const std::vector<float>& sigma,
               const std::vector<uint8_t>& rgb);
-  // The same again: colours of all pixels, because planes are carried across unknown ones.
+  // Restores the three arrays; rgb has the colours of all pixels, also of those without a distance,
+  // because planes are carried across them.
   void unpack(std::vector<float>& distance, std::vector<float>& sigma,
               std::vector<uint8_t>& rgb) const;
   size_t num_known() const { return distance_.size(); }

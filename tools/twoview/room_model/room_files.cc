@@ -149,7 +149,7 @@ std::vector<std::string> missing_words(const RoomModel& model) {
 }
 
 std::vector<std::string> direction_words(const RoomModel& model) {
-  constexpr double kHardly = 0.02;  // of all pixels
+  constexpr double kHardly = 0.02;  // below this share of all pixels a direction was hardly seen
   const char* const names[kNumDirections] = {
       "to the right of the plan",  "to the left of the plan", "to the top of the plan",
       "to the bottom of the plan", "upwards, to the ceiling", "downwards, to the floor"};

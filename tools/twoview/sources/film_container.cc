@@ -1,6 +1,6 @@
 // Why not OpenCV: 4.6 (Debian 12) turns a film of 90 degrees to the wrong side and names the turn
 // 90 where 5.0 says 270, and 5.0.0.93 says 25 pictures a second for every raw H.264 stream
-// (measured 2026-11-29). libavformat is what OpenCV itself asks.
+// (measured 2026-11-29). libavformat is what OpenCV itself reads films with.
 
 #include "sources/film_container.h"
 

@@ -1,5 +1,5 @@
-// What a film's container says, asked of libavformat: OpenCV's answers differ from version to
-// version (see film_container.cc).
+// What a film's container says, read with libavformat, since OpenCV's numbers differ from version
+// to version (see film_container.cc).
 #pragma once
 
 #include <cstdint>

@@ -11,7 +11,7 @@ namespace cli {
 // is there twice. Where such pictures rise among themselves, two that are more than a second early
 // or five of any, the clock began anew: two films in one file, a camera or a vehicle that was
 // started again. How long the pause was is not known; the pictures go on kPause_s later, and the
-// odometry is told of a gap.
+// odometry is given gap = 1.
 class StreamClock {
  public:
   static constexpr double kPause_s = 1;  // longer than the pauses over which a motion is continued

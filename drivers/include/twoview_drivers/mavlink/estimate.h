@@ -123,7 +123,7 @@ typedef struct tvm_track {
   double heading_rad;
 } tvm_track;
 
-/* What an autopilot is told, of the body (forward, right, down) in the local world. */
+/* What is sent to an autopilot: the body (forward, right, down) in the local world. */
 typedef struct tvm_estimate {
   /* sizeof(tvm_estimate), which the caller sets. */
   uint32_t struct_size;
@@ -161,7 +161,7 @@ typedef struct tvm_estimator {
   double path_m, last_place_sq, last_turn_sq;
   /* The last velocity and angular rate, along the axes of the world. */
   double last_velocity[3], last_rate[3];
-  /* What tvm_session_send_track has told last, and when. */
+  /* What tvm_session_send_track sent last, and when. */
   int32_t has_told, told_silence;
   /* The run of the vehicle's clock, the newest segment, and the first one that began in this run.
    */

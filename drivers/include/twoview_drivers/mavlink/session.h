@@ -104,7 +104,7 @@ typedef struct tvm_session_options {
   int32_t listen_only;
   /* The system id of the vehicle, 1 to 255; 0 (default): that of the first autopilot heard. */
   int32_t vehicle_system;
-  /* The system id to send with; 0 (default): the vehicle's, which MAVLink asks of an onboard
+  /* The system id to send with; 0 (default): the vehicle's, as MAVLink requires of an onboard
      computer. */
   int32_t own_system;
   /* The component id to send with. Default 191, MAV_COMP_ID_ONBOARD_COMPUTER. */

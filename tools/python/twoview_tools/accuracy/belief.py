@@ -175,7 +175,7 @@ class Views:
         self.found = {}
 
     def view(self, name, image, change=("", 1.0)):
-        """(pixels, camera) of an image, changed if so asked."""
+        """(pixels, camera) of an image, after the change (kind, factor); ("", 1.0): none."""
         key = name, image, change
         if key not in self.found:
             gray, camera = self.sets[name].view(image, change[0] == "file-lens")

@@ -3,7 +3,7 @@ twoview_tools.accuracy.belief, and judges it on sets that were left out of the f
 
 The event is: the rotation of a full pose is off by more than 5 degrees plus the truth's stated
 error. A logistic model, whose coefficients must have the sign that their evidence has (more
-agreement never raises the probability); where the fit asks for the other sign, that part is left
+agreement never raises the probability); where the fit gives the other sign, that part is left
 out. No set weighs more than MOST_WEIGHT pairs, so that the large sequences do not decide alone;
 sets of the same place are left out together. Of rows that climbed the rungs of effort, each rung
 that was run is a trial, and multiplies the odds of the model as in belief.cc. A set that is run

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Whether the lens of a set's camera file is right: the distortion that the matches ask for under
+"""Whether the lens of a set's camera file is right: the distortion that fits the matches under
 the true poses, fitted on one half of a sequence and judged on the other.
 
   scripts/belief --sets seq_chessboard_desk --pairs 1168 --others 0 --rows rows.jsonl \\

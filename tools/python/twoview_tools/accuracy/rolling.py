@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Pairs whose camera is not what the library is told: a rolling shutter, a wrong lens; rendered, so
-that the pose is known. How often is such a pair "ok" with an error that its covariance excludes?
+"""Pairs whose camera is not the one that the library is given: a rolling shutter, a wrong lens;
+rendered, so that the pose is known. How often is such a pair "ok" with an error that its
+covariance excludes?
 
   scripts/python -m twoview_tools.accuracy.rolling [--pairs N] [--rows FILE] [--save DIR]
 
@@ -13,9 +14,9 @@ line of the table for each kind:
 
   global         no rolling shutter: the same pairs with a readout of 0 s
   x, y, z, mix   rolling shutters by axis
-  lens           global, and the lens (k1 -0.2 or 0.1) is not told to the library
-  focal          global, and the focal length is told 10 per cent too short or too long
-  centre         global, and the principal point is told 20 pixels off
+  lens           global, and the library is given no lens (it has k1 -0.2 or 0.1)
+  focal          global, and the library is given a focal length 10 per cent too short or long
+  centre         global, and the library is given a principal point 20 pixels off
 
 "beyond 3 sigma": the rotation or the direction is off by more than three of its standard deviations
 (the root of the trace of its block of the covariance)."""
@@ -199,7 +200,7 @@ class Pair:
         return np.clip(np.rint(grey), 0, 255).astype(np.uint8)
 
     def told(self):
-        """K as the library is told it."""
+        """The K that the library is given."""
         focal, centre = FOCAL, complex((WIDTH - 1) / 2, (HEIGHT - 1) / 2)
         if self.kind == "focal":
             focal *= self.focal_factor

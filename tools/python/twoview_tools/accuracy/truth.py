@@ -52,12 +52,12 @@ STATED = {
     # a calibrated gantry, no figure; templeSR's 0.42 and 0.34 for both
     "middlebury_dinoSR": Stated("object", 0.4, 0.35),
     "middlebury_templeSR": Stated("building", 0.4, 0.35),
-    # "as given"; 0.08 and 0.08
+    # "as given", which is no figure; 0.08 and 0.08
     "pc_room": Stated("room", 0.1, 0.1),
     # "rotation about 0.1 deg, position about 1 mm"
     "seq_chessboard_desk": Stated("room", 0.1, 0.0, 0.001),
     # "exact (rendered)"; of seq_tsukuba the published focal length is not: the matches under the
-    # true poses ask for one 1.2 per cent longer, at all gaps alike
+    # true poses fit one 1.2 per cent longer, at all gaps alike
     "seq_icl_of_kt3": Stated("room", 0.0, 0.0),
     # "some centimetres from frame to frame", "not more than about 0.1 deg between neighbours"; its
     # frames 100 to 119 are kitti00_turn's

@@ -409,7 +409,7 @@ class Bag:
     def messages(self, wanted=None):
         """(topic, receive time in ns, data) of each message of the topics `wanted` (names; None:
         all), in the order in which they lie in the bag. The data is a buffer that is valid until
-        the next message is asked for."""
+        the next message is read."""
         self.cut = ""
         for file in self._files:
             yield from self._of_file(file, wanted)

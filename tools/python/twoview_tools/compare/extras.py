@@ -110,7 +110,7 @@ def draw(plot):
 
 
 def write(folder, report, pairs, tables, figures):
-    """Writes what --tables and --figures ask for beside the report."""
+    """Writes the tables and figures of --tables and --figures beside the report."""
     texts = {"csv": csv_text, "tex": tex_text}
     for kind in tables:
         _replace(os.path.join(folder, "systems." + kind), texts[kind](report).encode())

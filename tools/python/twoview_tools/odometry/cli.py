@@ -129,7 +129,7 @@ def seeds_of(arguments):
 
 
 def more_figures(arguments, runs_of, scratch):
-    """Yields (reached, sentence) of what is measured apart from the sequences, as it is asked for.
+    """Yields (reached, sentence) of each measurement beside the sequences that an option names.
     runs_of: [(run, source folder, out)] of the program's own runs with the first seed."""
     if arguments.colmap:
         for run, folder, out in runs_of:
