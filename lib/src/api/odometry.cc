@@ -355,7 +355,7 @@ tv_status tv_odometry_pose_of(const tv_odometry* odometry, int32_t reference_id,
   const tv::Map& map = odometry->map;
   int32_t id = reference_id;
   int32_t k = tv::find_keyframe(map, id);
-  // One step, but for a map that an earlier version saved.
+  // A removed keyframe leads to a kept one in one step, in maps of earlier versions in several.
   for (int32_t steps = 0; k < 0 && steps <= map.num_removed; ++steps) {
     int32_t n = 0;
     while (n < map.num_removed && map.removed[n].id != id) ++n;

@@ -44,7 +44,7 @@ struct Results {
   // The cameras of the two views, corrected by the present estimate; set for full poses only.
   tv_camera cameras[2];
   tv_pixel_pairs pairs;  // of the present matches; with sigmas where sigma_by_size is not 0
-  float keypoint_size;   // of sigma 1
+  float keypoint_size;   // the size of a keypoint whose sigma is 1
   double sigma_by_size;  // the option
 };
 
@@ -456,7 +456,7 @@ __attribute__((noinline)) bool looks_mirrored(tv_context* context, const Attempt
   const int32_t strongest[2] = {std::min(attempt.num_keypoints[0], most),
                                 std::min(attempt.num_keypoints[1], most)};
   const tv_features features[2] = {features_of(r, strongest, 0), features_of(r, strongest, 1)};
-  int32_t count[2] = {attempt.num_found, 0};  // as they are, mirrored
+  int32_t count[2] = {attempt.num_found, 0};  // matches as they are, and mirrored
   for (int mirrored = 0; mirrored < 2; ++mirrored) {
     if (mirrored == 1 || attempt.rung == 0) {
       tv_match(context, &features[0], &features[1], options, r.more_matches,

@@ -43,7 +43,7 @@ size_t reconstruct_result_bytes(const tv_limits& limits) {
          arena_bytes<tv_point>(m) + arena_bytes<float>(m);
 }
 
-// Of api/extract.h, extract_rung.
+// The bytes that extract_rung (api/extract.h) takes.
 size_t extract_rung_bytes(const tv_limits& limits, int32_t rung) {
   tv_limits of_view = limits;
   of_view.max_keypoints = view_budget(rung, 0, limits.max_keypoints);

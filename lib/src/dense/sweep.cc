@@ -7,7 +7,7 @@
 namespace tv {
 namespace {
 
-// What differs in all steps but the winner's and its neighbours', at least, in units of a bit.
+// The least margin of the winner's sum over that of every step but its neighbours, in bits.
 constexpr int32_t kLeastMargin = 2;
 // A pixel is brighter than another if it is so by more than this, in grey levels.
 constexpr int32_t kLeastTolerance = 2;

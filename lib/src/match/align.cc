@@ -21,10 +21,10 @@ constexpr double kStep = 1.0, kMostStep = 1.42;
 // alignment that counts as found, and how far a keypoint may move.
 constexpr double kLongestStep = 1.0, kHopeless[2] = {2.0, 1.0};
 constexpr double kShortStep = 0.05, kLastStep = 0.2, kMostShift = 1.2;
-constexpr double kLeastGain = 0.1;         // of one window over the other
+constexpr double kLeastGain = 0.1;         // least slope of one window's greys over the other's
 constexpr double kLeastContrast = 1.0;     // variance of a window, squared grey levels
 constexpr double kLeastPivot = 1e-4;       // of a normal equation, over its diagonal
-constexpr double kLostSimilarity = 0.002;  // how much less the squared correlation may become
+constexpr double kLostSimilarity = 0.002;  // by how much the squared correlation may fall
 
 constexpr double kMargin = 1.01;   // of a window to the border, in pixels: kernels.h, and rounding
 constexpr double kMostReach = 64;  // of a window from its middle, in pixels

@@ -26,7 +26,7 @@ bool is_near(const tv_keypoint& a, const tv_keypoint& b) {
   return dx < kOnePlacePx && dx > -kOnePlacePx && dy < kOnePlacePx && dy > -kOnePlacePx;
 }
 
-// Of coordinates within 1e5 pixels.
+// The cell of a coordinate, which is within 1e5 pixels.
 int32_t cell_of(float x) { return static_cast<int32_t>(x / kOnePlacePx + 65536); }
 
 uint32_t slot_of(int32_t cell_x, int32_t cell_y, uint32_t mask) {

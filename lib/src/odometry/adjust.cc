@@ -33,7 +33,7 @@ int32_t choose_adjusted(Odometry* odometry, int32_t keyframe, int32_t* shared, i
   count_shared(odometry, keyframe, shared);
   const int32_t num =
       largest(shared, odometry->map.num_keyframes, kLeastShared, odometry->options.window, chosen);
-  for (int32_t i = 1; i < num; ++i) {  // few: std::sort is half a kilobyte
+  for (int32_t i = 1; i < num; ++i) {  // few numbers; std::sort would take half a kilobyte
     for (int32_t k = i; k > 0 && chosen[k] < chosen[k - 1]; --k) {
       std::swap(chosen[k], chosen[k - 1]);
     }
@@ -83,7 +83,7 @@ size_t adjust_bytes(const tv_odometry_options& o) {
   return map_window_bytes(o, sizes) +
          2 * arena_bytes<int32_t>(static_cast<size_t>(o.max_keyframes)) +
          arena_bytes<double>(36 * static_cast<size_t>(sizes.views)) +
-         arena_bytes<uint8_t>(static_cast<size_t>(o.max_points));  // spare: marks took its place
+         arena_bytes<uint8_t>(static_cast<size_t>(o.max_points));  // unused since there are marks
 }
 
 void count_shared(Odometry* odometry, int32_t keyframe, int32_t* shared) {

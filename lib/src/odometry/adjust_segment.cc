@@ -15,10 +15,10 @@ constexpr int32_t kHeldOneIn = 4;
 // Points are chosen until each keyframe sees its share of the observations divided by this: a point
 // that is chosen for one keyframe has observations in the others.
 constexpr double kOverlap = 1.7;
-// Of the first step. With a hundred times as much, a long path bends by a tenth of what it should
-// at each step.
+// The damping of the first step. With a hundred times as much, each step corrects only a tenth of
+// the bend of a long path.
 constexpr double kDamping = 1e-6;
-constexpr double kLeastGain = 1e-3;  // of the cost, for which another step is worth its time
+constexpr double kLeastGain = 1e-3;  // share of the cost that a step must gain for another one
 
 WindowSizes sizes_of(const tv_odometry_options& o) {
   return {std::min(o.max_keyframes, kMostKeyframes), std::min(6 * o.max_keypoints, o.max_points),
@@ -77,8 +77,8 @@ struct Sharing {
   uint8_t* at(int32_t view) const { return reinterpret_cast<uint8_t*>(row(view)); }
 };
 
-// Of the first views. `last` has room for the window's points and observations, and -1 for each of
-// the points.
+// Which of the first num_views views share a point. `last` has room for the window's points and
+// observations, and holds -1 for each of the points.
 Sharing find_sharing(const MapWindow& window, int32_t num_views, int32_t* last, Arena& arena) {
   Sharing sharing{(num_views + 7) / 8, nullptr};
   const int32_t size = sharing.num_words * num_views;

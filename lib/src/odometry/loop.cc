@@ -17,15 +17,15 @@
 namespace tv {
 namespace {
 
-// A change of the newest keyframe's pose by this share of the path, or by so many radians, is a
-// jump.
+// The path jumps where the newest keyframe's pose changes by more than this share of the path's
+// length, or by more than so many radians.
 constexpr double kJumpShare = 0.03, kJumpTurn = 0.05;
 constexpr int32_t kLeastKeyframesBetween = 12;
 constexpr int32_t kLeastMatches = 25, kLeastInliers = 50, kLeastCommon = 8;
 // With fewer inliers a loop of the same segment, or between upright ones, needs another one of the
 // last frames that agrees with it, and most of the matches.
 constexpr int32_t kLeastWeakInliers = 24, kMostFramesBetween = 15;
-constexpr double kWeakShare = 0.75, kJoinShare = 0.67;  // within a segment, between two
+constexpr double kWeakShare = 0.75, kJoinShare = 0.67;  // of the matches: in one segment, in two
 constexpr double kWeakWay = 0.03, kWeakTurn = 0.015;    // median depths, radians
 constexpr double kLeastWeakPath = 4;                    // median depths
 // A correction larger than this, in median depths or radians, needs another loop that agrees, too.
@@ -39,7 +39,7 @@ constexpr double kLargestYaw = 0.2;
 // Cameras farther from each other, in median depths, or turned by more see nothing in common.
 constexpr double kFarthestSeen = 2, kMostTurned = 1.2;
 constexpr double kLeastScale = 0.6875, kLargestScale = 1.5;
-constexpr int32_t kJoinSteps = 20;  // of the adjustment where two maps meet
+constexpr int32_t kJoinSteps = 20;  // of the adjustment around the keyframe where two maps meet
 // After a loop: steps of the adjustment of many keyframes, one at each frame, and of the points. At
 // least so many of the newest keyframes are adjusted, and all since the loop before.
 constexpr int32_t kPointSteps = 3, kLeastSpread = 100;
@@ -276,7 +276,7 @@ bool close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const 
     moved[k].scale = 0;
     if (own.segment != segment) continue;
     if (segment == old_segment && k <= end.keyframe) continue;
-    // As the loop's end says: the way from the newest keyframe, in the other scale.
+    // The pose by the loop's end: the way from the newest keyframe, in the old part's scale.
     Rigid relative = motion_between(now, own.cam_from_world);
     scale_by(end.scale, relative.t);
     const Rigid from_end = compose(relative, end.cam_from_world);
@@ -327,7 +327,7 @@ void spread_loop(Odometry* odometry, Frame* frame) {
   const Rigid relative = compose(frame->cam_from_world, inverse(before));
   if (!adjust_segment(odometry, spread->segment, spread->first_id, 1)) spread->num_steps = 0;
   frame->cam_from_world = compose(relative, reference.cam_from_world);
-  // So does the beginning of the way that is compared with the velocities.
+  // The beginning of the way that is compared with the velocities moves with it, too.
   double from[3];
   transform(before, odometry->travel.from, from);
   transform(inverse(reference.cam_from_world), from, odometry->travel.from);

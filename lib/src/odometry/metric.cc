@@ -10,7 +10,8 @@
 namespace tv {
 namespace {
 
-// Relative: the metre becomes the unit at the first, and is given up above the second.
+// Relative standard deviations of the scale: the metre becomes the unit at the first, and is given
+// up above the second.
 constexpr double kLargestScaleSigma = 0.1, kLostScaleSigma = 0.2;
 // Heights and velocities contradict each other above the quantile 0.99 of chi squared of one degree
 // of freedom. They agree again below that of 0.9, so that the unit does not change to and fro.
@@ -53,8 +54,8 @@ void rescale(Odometry* odometry, double scale, Frame* frame) {
   odometry->median_depth *= scale;
 }
 
-// The map's way since a travel began beside that of the velocities: its products with itself and
-// with theirs, and theirs with itself.
+// The map's way since a travel began beside that of the velocities: the scalar products of the
+// map's with itself, of both, and of the velocities' with itself.
 struct Ways {
   double way[3], square, product, travel_sq;
 };
@@ -92,7 +93,7 @@ void add_way(Odometry* odometry, int32_t keyframe) {
   const MapKeyframe& before = odometry->map.keyframes[keyframe - 1];
   if (own.segment != odometry->segment || before.segment != odometry->segment) return;
   if (!own.is_followed) return;
-  // In the camera's axes, the way back.
+  // The way back to the keyframe before, in this camera's axes.
   const Rigid motion = motion_between(before.cam_from_world, own.cam_from_world);
   const double* back = motion.t;
   const double square = length_sq_of(back), noise = kWayError * kWayError * square;
@@ -133,7 +134,7 @@ ScaleEstimate estimate_of(const ScaleEvidence& evidence, int32_t source) {
   return {source, share * evidence.product, share * evidence.square};
 }
 
-// The sums without the keyframes' ways.
+// Sets the sums to what a loaded map brought, without the keyframes' ways.
 void begin_sums(MetricScale* scale) {
   scale->height = scale->velocity = scale->contrary = ScaleEvidence{};
   (scale->loaded_source == TV_SCALE_HEIGHT ? scale->height : scale->velocity) = scale->loaded;
@@ -148,7 +149,7 @@ bool is_contradicted(const MetricScale& known) {
   const double variance = 1 / h.square + 1 / v.square +
                           kScaleError * kScaleError * (height * height + velocity * velocity);
   if (!known.is_contradicted) return difference * difference > kContradicted * variance;
-  // They agree where they could have contradicted each other: one that is twice the other.
+  // They count as agreeing only where a scale twice as large would have been a contradiction.
   const double larger = std::max(std::fabs(height), std::fabs(velocity));
   return difference * difference > kAgreed * variance ||
          4 * kContradicted * variance > larger * larger;
@@ -203,7 +204,7 @@ void read_sensors(const tv_odometry_frame& input, Frame* frame) {
 bool check_attitude(const Odometry& odometry, Frame* frame) {
   Sensors* s = &frame->sensors;
   if (!odometry.is_upright || s->attitude_sigma_rad == 0) return true;
-  // Between down by the map and by the attitude.
+  // The angle between down as the map has it and as the attitude says.
   double down[3];
   rotate_back(frame->cam_from_world.R, s->world_from_cam + 6, down);
   const double tilt = acos(down[2]);
@@ -240,7 +241,7 @@ void add_travel(Odometry* odometry, const Frame& frame) {
   travel->bound_m += sigma;
 }
 
-// Not inlined, and neither is the next one: smaller.
+// Not inlined, and neither is measure_reach, because the library is smaller so.
 __attribute__((noinline)) void begin_travel(Odometry* odometry, const Rigid& cam_from_world,
                                             int32_t keyframe_id) {
   odometry->travel = Travel{};
@@ -333,7 +334,7 @@ void change_scale(Odometry* odometry, int32_t from, int32_t to) {
     odometry->other_segment = from;
   }
   if (!is_known) odometry->scale = MetricScale{};
-  // The sensors are the same ones.
+  // The sensors that contradict each other are the same in every segment.
   if (was_contradicted) {
     odometry->scale.is_contradicted = true;
     odometry->scale.source = TV_SCALE_UNIT;

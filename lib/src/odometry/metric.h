@@ -47,14 +47,15 @@ ScaleEstimate height_estimate(const MetricScale& scale);
 ScaleEstimate velocity_estimate(const MetricScale& scale);
 ScaleEstimate estimate_of(const MetricScale& scale);
 
-// The evidence that says this: as it is kept in a map's bytes, where a scale that was contradicted
-// leaves none.
+// The evidence that gives this estimate, for a map that is loaded: a map's bytes keep the estimate
+// alone, and nothing of a scale that was contradicted.
 MetricScale scale_of(const ScaleEstimate& estimate, int32_t source, double sigma);
 
 // A segment, whose unit is `scale` of the tracked one's, became part of it.
 void join_scale(const MetricScale& other, double scale, Odometry* odometry);
 
-// What is known of the scale is kept, and what was known of the segment's is taken up.
+// Keeps what is known of the scale of the segment `from`, and takes up what is known of that of
+// `to`.
 void change_scale(Odometry* odometry, int32_t from, int32_t to);
 
 }  // namespace tv

@@ -29,7 +29,7 @@ struct Frame {
   int32_t* cell_items;
   int32_t number;  // how many frames were given before it
   double time_s;
-  int32_t next_try;  // where it waits for a second view: the number of the first to match it with
+  int32_t next_try;  // while it waits for a second view: the first frame to match it with
   bool has_pose;
   Rigid cam_from_world;
   Sensors sensors;
@@ -61,21 +61,21 @@ struct WeakLoop {
 // What is left to do after a loop or a correction of the camera, a part at each frame that has no
 // keyframe to adjust.
 struct Spread {
-  int32_t num_steps;   // of the adjustment of many keyframes together
-  int32_t next_place;  // then: of the points, from which on they are still to be adjusted
-  int32_t segment;     // that is adjusted
-  int32_t first_id;    // of the keyframes that the steps adjust
-  int32_t last_id;     // of the newest keyframe when it began
+  int32_t num_steps;   // how many steps of many keyframes together are left
+  int32_t next_place;  // after these: the place of the first point that is not adjusted yet
+  int32_t segment;     // the segment that is adjusted
+  int32_t first_id;    // the id of the first keyframe that the steps adjust
+  int32_t last_id;     // the id of the newest keyframe when the steps began
 };
 
 // The way since a frame in metres, in the world's axes, as the velocities say.
 struct Travel {
   bool is_known;
-  int32_t keyframe_id;  // that it began at; -1: a frame that is no keyframe
-  double from[3];       // the camera's centre there
+  int32_t keyframe_id;  // the keyframe that it began at; -1: a frame that is no keyframe
+  double from[3];       // the camera's centre where it began
   double way_m[3], variance;
   double bound_m;    // its standard deviation if all errors are equal
-  bool is_contrary;  // the map's way to a frame since then contradicted it
+  bool is_contrary;  // the map's way to some frame since then contradicted it
 };
 
 // What the sensors say of a frame: the turn from the map's axes to those of its attitude, which
@@ -105,9 +105,9 @@ struct ScaleEvidence {
 
 struct MetricScale {
   int32_t source;         // tv_scale_source
-  int32_t loaded_source;  // the one of what a map's bytes brought
+  int32_t loaded_source;  // the source of the scale in a map that was loaded
   bool is_contradicted;   // heights and velocities contradict each other
-  bool was_known;         // the metre has been the unit
+  bool was_known;         // the metre is or has been the unit of the segment
   // What a map's bytes brought, and the sums over the keyframes' ways and that: of heights, of
   // velocities, and of those ways that contradict the map and are left out as long as the others
   // say more.
@@ -138,7 +138,7 @@ struct tv_odometry {
   tv::CameraEvidence camera_evidence;
   tv_context* context;  // of the stages that a frame takes through the public functions
   const tvk_set* kernels;
-  int32_t max_matched;  // descriptors of one side of a match
+  int32_t max_matched;  // the most descriptors on either side of a call of the matcher
   tv_feature_options features;
   tv::Map map;
   tv::Arena scratch;
@@ -148,7 +148,7 @@ struct tv_odometry {
   tv::Frame starts[tv::kNumStarts];
   tv::StillCell* still_cells;
   int32_t still_columns, still_rows;
-  int32_t still_until;  // the last of theirs
+  int32_t still_until;  // the largest `until` of these cells
   int32_t num_starts;
   // The points that are looked for in the next frame: those around the reference keyframe.
   int32_t* local_points;
@@ -163,15 +163,15 @@ struct tv_odometry {
   int32_t num_frames, num_segments, num_relocations, num_loops;
   int32_t status;
   int32_t lost_frames, turned_frames, next_search, next_loop;
-  int32_t keyframe_inliers;  // of the frame that became the last keyframe
+  int32_t keyframe_inliers;  // how many points the last keyframe saw when it was adjusted
   int32_t unadjusted_id;     // of the newest keyframe until it is adjusted, else -1
-  bool closed_loop;          // with it
-  bool was_moved_far;        // by its adjustment, since the last tracked frame
-  int32_t next_neighbour;    // of it, the first with which no points were made yet
+  bool closed_loop;          // whether that keyframe closed a loop
+  bool was_moved_far;        // its adjustment was a jump, since the last tracked frame
+  int32_t next_neighbour;    // its first neighbour with which no points were made yet
   bool is_found_again;       // a lost frame was, and no loop has closed since
   tv::WeakLoop weak_loop;
   tv::Spread spread;
-  bool took_step;  // of it, before this frame was tracked
+  bool took_step;  // a step of `spread` was taken before this frame was tracked
   tv::MapCheck check;
   // The last keyframe that its own matches with earlier ones confirmed. Doubts: the reasons of the
   // frames of a segment since some saw one plane only, or contradicted the map, or since it began.
@@ -179,7 +179,7 @@ struct tv_odometry {
   uint32_t doubts;
   int32_t doubtful_segment;
   tv::Reach confirmed;  // what the sensors said when it was confirmed
-  double most_m;        // the longest way until now
+  double most_m;        // the longest way that the camera may have gone until now, in metres
   double median_depth;
   double turn_sigma;  // the largest standard deviation of the frame's attitude, in radians
   double drift_sq;    // sum of its squares, of the keyframes since the start or the last loop

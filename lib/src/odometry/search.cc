@@ -12,7 +12,7 @@ namespace {
 constexpr int32_t kMostCandidates = 400;
 constexpr int32_t kMaxDistance = 200;  // of descriptors, L2
 constexpr double kSearchRatio = 0.9;   // of the nearest one's distance to that of the second
-constexpr int32_t kAhead = 8;          // points: their places in the map are far from each other
+constexpr int32_t kAhead = 8;          // how many points ahead memory is prefetched
 // The keypoints within this radius in pixels are compared: a match is the nearest of them all.
 constexpr double kComparedRadius = 20.0;
 constexpr float kSameCornerSq = 16.0f;       // px^2: nearer keypoints are of the same corner
@@ -116,7 +116,7 @@ int32_t find_points(Odometry* odometry, const PointSearch& search, Frame* frame)
       const int32_t end = frame->cell_starts[cy * columns + x1 + 1];
       for (int32_t n = begin; n < end && num < kMostCandidates; ++n) {
         const float dx = positions[n].x - px, dy = positions[n].y - py;
-        candidates[num] = frame->cell_items[n];  // stays if it is near, which no branch can foresee
+        candidates[num] = frame->cell_items[n];  // kept if it is near; a branch would mispredict
         num += dx * dx + dy * dy <= reach * reach;
       }
     }

@@ -13,7 +13,7 @@ namespace {
 constexpr int32_t kLeastMatches = 30, kLeastPoints = 40;
 constexpr double kLeastParallax = 0.015;  // radians, the median
 constexpr int32_t kLeastTurnInliers = 50;
-constexpr int32_t kFramesBetween = 6;      // between frames that wait
+constexpr int32_t kFramesBetween = 6;      // from one frame that waits to the next
 constexpr double kLargestTurnSigma = 0.3;  // of the median parallax, in frames nearer than that
 constexpr double kGrowth = 2;              // how many times as fast the parallax may go on growing
 
@@ -134,13 +134,13 @@ bool start_map(Odometry* odometry, Frame* frame, uint32_t* reasons) {
       continue;
     }
     *reasons |= pair.view->reasons;
-    // Two frames that lie near each other gain by waiting.
+    // For two frames near each other a later view may be better, so the start waits for it.
     const bool is_near = frame->number - first->number < kFramesBetween;
     if (!pair.view->has_t || pair.view->median_parallax_rad < kLeastParallax ||
         (is_near && !is_turn_sure(*pair.view))) {
       *reasons |= TV_REASON_LOW_PARALLAX;
       first->next_try = next_try_of(*first, *frame, pair.view->median_parallax_rad);
-      // Those that follow are nearer still, but for a camera that went to and fro.
+      // The waiting frames that follow are nearer still, unless the camera went to and fro.
       if (pair.view->median_parallax_rad < kLeastParallax / 2) break;
       continue;
     }

@@ -23,7 +23,8 @@ int32_t cell_of(float x, int32_t cells) {
 
 bool is_still(const StillCell& cell, int32_t frame) { return cell.until > frame; }
 
-// The cells that the core of the keypoint's descriptor covers: what is next to text is half text.
+// Marks the cells that the core of the keypoint's descriptor covers: next to text, half of what a
+// descriptor sees is text.
 void mark_cells(Odometry* odometry, const tv_keypoint& keypoint) {
   const int32_t now = odometry->num_frames;
   const int32_t columns = odometry->still_columns, rows = odometry->still_rows;

@@ -20,7 +20,7 @@ namespace tv {
 namespace {
 
 constexpr int32_t kLeastInliers = 20, kLeastRelocated = 30;
-constexpr int32_t kSearchedKeyframes = 6;  // of a lost frame
+constexpr int32_t kSearchedKeyframes = 6;  // in which a lost frame is looked for, a frame
 // A frame becomes a keyframe when the camera moved by kFarMoved median depths or turned by
 // kFarTurned radians since the last one, and earlier where few of its points are left.
 constexpr double kFarMoved = 0.10, kFarTurned = 0.25, kLeastMoved = 0.02, kLeastTurned = 0.08;
@@ -29,7 +29,7 @@ constexpr int32_t kWindowSteps = 4;        // of the adjustment after a keyframe
 constexpr int32_t kLoopSteps = 8;          // and after a loop
 constexpr int32_t kLoopKeyframes = 2;      // that are searched for a loop at each frame
 constexpr int32_t kMostTurnedFrames = 60;  // of status rotation, in a row
-constexpr int32_t kLostBeforeStart = 8;    // frames
+constexpr int32_t kLostBeforeStart = 8;    // frames without a pose before a new segment
 // Frames are weak while the keyframes' attitudes are so uncertain together, in radians.
 constexpr double kMostDrift = 0.026;
 // Velocities are believed against the map once so many of its ways agreed with them. The map is
@@ -214,7 +214,7 @@ bool heed_check(Odometry* odometry) {
 bool add_frame_as_keyframe(Odometry* odometry, Frame* frame, LoopEnd* loop,
                            tv_odometry_state* state) {
   Map& map = odometry->map;
-  Frame* again = &odometry->starts[0];  // of the loop
+  Frame* again = &odometry->starts[0];  // the same frame, as it sees the loop's old points
   const int32_t end_id = loop != nullptr ? map.keyframes[loop->keyframe].id : -1;
   const int32_t next_point_id = map.next_point_id;
   make_room(odometry, 1);
@@ -426,7 +426,7 @@ bool begin_segment(Odometry* odometry, Frame* frame, tv_odometry_state* state) {
   return true;
 }
 
-// Not inlined, and neither is the next one: smaller.
+// Not inlined, and neither is clear_state, because the library is smaller so.
 __attribute__((noinline)) void write_counts(const Odometry& odometry, tv_odometry_state* state) {
   state->status = odometry.status;
   state->num_frames = odometry.num_frames;
@@ -453,7 +453,7 @@ __attribute__((noinline)) void write_counts(const Odometry& odometry, tv_odometr
   state->principal_point_shift_px[1] = odometry.camera.model.cy - odometry.given_camera.cy;
 }
 
-// Makes it that of a frame without a pose.
+// Makes *state that of a frame without a pose.
 __attribute__((noinline)) void clear_state(const Frame& frame, tv_odometry_state* state) {
   *state = tv_odometry_state{};
   state->num_keypoints = frame.num;

@@ -216,7 +216,7 @@ bool visit_near(const Fusion& f, const Visit& visit) {
         const Mat3& R = f.view.rotation;
         direction[i] = ((R(i, 0) * d[0] + R(i, 1) * d[1]) + R(i, 2) * d[2]);
       }
-      const int32_t samples = f.room.options.truncation_voxels + 1;  // two voxels apart
+      const int32_t samples = f.room.options.truncation_voxels + 1;  // two voxels apart on a ray
       for (int32_t s = 0; s < samples; ++s) {
         const double range = m.distance + f.truncation * (2.0 * s / (samples - 1) - 1);
         int32_t place[3];

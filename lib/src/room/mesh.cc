@@ -178,7 +178,7 @@ void make_vertex(const tv_room& room, const Sample* cell, const BlockPlace& plac
   // A pixel's weight is 16 (voxel / sigma)^2.
   const double mean_weight = static_cast<double>(weight) / (2 * crossings);
   vertex->sigma = static_cast<float>(4 * voxel / std::sqrt(mean_weight));
-  vertex->inferred = inferred > crossings;  // of two voxels a crossing
+  vertex->inferred = inferred > crossings;  // each crossing counts two voxels
   vertex->num_maps = maps;
 }
 
