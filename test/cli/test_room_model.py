@@ -394,6 +394,35 @@ class RoomTest(CliTest):
         self.assert_walls(self.out, 1)
         self.assertEqual(self.result()["options"]["poses"], str(self.source / "groundtruth.txt"))
 
+    def test_poses_that_the_pictures_contradict_are_refused(self):
+        """The true path in a world that is turned: the cameras all have one rotation, and go along
+        their x. Written as other programs do, each file is another path."""
+        turn = np.radians(100)
+        axis = np.array([1, 2, 3]) / math.sqrt(14)
+        x, y, z = math.sin(turn / 2) * axis
+        w = math.cos(turn / 2)
+        R = np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                      [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                      [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
+        places = [STEP * k * R[:, 0] for k in range(COUNT)]
+
+        def file(rotation, places, name):
+            return self.write(name, "".join(
+                " ".join(f"{v:.9f}" for v in (t, *p, *rotation)) + "\n"
+                for t, p in zip(TIMES, places)))
+
+        right = file((x, y, z, w), places, "right.txt")
+        self.succeed(self.room("--poses", right, "--voxel", "0.2", folder=self.source))
+        other = self.folder / "other"
+        for words, rotation, at in (
+                ("quaternions with w first", (w, x, y, z), places),
+                ("camera_from_world", (-x, -y, -z, w), [-R.T @ p for p in places]),
+                ("of these frames", (x, y, z, w), places[::-1])):
+            with self.subTest(words):
+                poses = file(rotation, at, "wrong.txt")
+                done = self.room("--poses", poses, folder=self.source, out=other)
+                self.assert_refused(done, "the pictures contradict", words, out=other)
+
     def test_a_model_of_colmap_and_its_pictures_serve_as_well(self):
         model = self.folder / "model"
         shutil.copytree(self.flight / "colmap", model)

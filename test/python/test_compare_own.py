@@ -118,6 +118,14 @@ class Files(unittest.TestCase):
                 file.write(data)
             self.refused(path, *words)
 
+    def test_exchanged_sides_are_refused_where_the_pictures_tell(self):
+        picture = np.random.default_rng(1).integers(0, 256, (320, 340))
+        images = [picture[:, :320], picture[:, 9:329]]  # what is at x is at x - 9 in the second
+        own.require_order(A, B, images, "a.npz")
+        with self.assertRaisesRegex(own.Refused, "a.npz: .* sides are exchanged"):
+            own.require_order(B, A, images, "a.npz")
+        own.require_order(B, A, [np.zeros((320, 320))] * 2, "plain pictures tell nothing")
+
     def test_a_folder_of_files(self):
         for name in ("m/a_b_matches.npz", "m/x-y-0.png_x-z-1.png.csv", "m/deep/c_d.txt",
                      "m/notes.md"):
@@ -224,6 +232,27 @@ class Report(unittest.TestCase):
             figures = os.listdir(os.path.join(out, "figures"))
             self.assertIn("recall_of_the_pipelines.svg", figures)
             self.assertEqual(sum(f.endswith(".pdf") for f in figures), len(figures) // 2)
+
+    def test_exchanged_sides_are_a_failure_with_a_reason(self):
+        support.skip_without()
+        import cv2
+        sift = cv2.SIFT_create(300)
+        images = [cv2.imread(os.path.join(support.MOTORCYCLE, name), 0) for name in support.IMAGES]
+        (k0, d0), (k1, d1) = (sift.detectAndCompute(image, None) for image in images)
+        matches = cv2.BFMatcher(crossCheck=True).match(d0, d1)
+        with tempfile.TemporaryDirectory() as folder:
+            np.savez(os.path.join(folder, "motorcycle_left_motorcycle_right.npz"),
+                     mkpts0=[k1[m.trainIdx].pt for m in matches],
+                     mkpts1=[k0[m.queryIdx].pt for m in matches])
+            pairs = support.write(folder, "pairs.txt", f"{support.LINE} {support.TRUTH}\n")
+            done = support.run(pairs, "--images", support.MOTORCYCLE, "-o",
+                               os.path.join(folder, "out"), "--quiet", "--systems",
+                               "twoview_five_point", "--matches", "net=" + folder)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            with open(os.path.join(folder, "out", "report.json"), encoding="utf-8") as f:
+                row = json.load(f)["pairs"][0]["rows"]["pipeline"]["net"]
+            self.assertEqual(row["status"], "failed")
+            self.assertIn("sides are exchanged", row["message"])
 
 
 if __name__ == "__main__":

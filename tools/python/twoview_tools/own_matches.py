@@ -301,6 +301,46 @@ def require_pixels(matches, sizes, name, may_be_smaller=True):
                       "that they were not")
 
 
+# Of squares around two pixels that look alike: their side, the least deviation of each in grey
+# levels, and the least correlation. tools/twoview/pair/own_matches.cc has the same rule.
+SIDE, LEAST_SIGMA, ALIKE = 11, 3.0, 0.7
+MOST_LOOKED_AT = 400  # matches
+SHARE, CLEARLY = 0.2, 5  # alike with the sides exchanged, of all, and times those as they stand
+
+
+def _squares(image, pixels):
+    """(n, SIDE * SIDE) normalised grey levels around pixels; NaN where there is nothing to see."""
+    out = np.full((len(pixels), SIDE * SIDE), np.nan)
+    half = SIDE // 2
+    for k, (x, y) in enumerate(np.floor(np.asarray(pixels, float) + 0.5).astype(int)):
+        if min(x, y) < half or x + half >= image.shape[1] or y + half >= image.shape[0]:
+            continue
+        square = image[y - half:y + half + 1, x - half:x + half + 1].astype(float).ravel()
+        if square.std() >= LEAST_SIGMA:
+            out[k] = (square - square.mean()) / square.std()
+    return out
+
+
+def _num_alike(images, pixels0, pixels1):
+    correlation = (_squares(images[0], pixels0) * _squares(images[1], pixels1)).mean(1)
+    return int((correlation > ALIKE).sum())  # a comparison with NaN is False
+
+
+def require_order(pixels0, pixels1, images, name):
+    """Refused where the pictures (grey, of the size that the pixels are of) agree at the matches
+    only with the sides exchanged: the geometry is as good then, but of the other direction."""
+    step = 1 + len(pixels0) // MOST_LOOKED_AT
+    pixels0, pixels1 = pixels0[::step], pixels1[::step]
+    if len(pixels0) < TELLING:
+        return
+    as_given = _num_alike(images, pixels0, pixels1)
+    exchanged = _num_alike(images, pixels1, pixels0)
+    if exchanged >= SHARE * len(pixels0) and exchanged >= CLEARLY * (as_given + 1):
+        raise Refused(f"{name}: the pictures look alike at its matches where the sides are "
+                      f"exchanged ({exchanged} of {len(pixels0)}; as they stand, {as_given}): "
+                      "exchange both, or name the pictures in the other order")
+
+
 # ---- folders -------------------------------------------------------------------------------------
 
 def _forms(name0, name1):

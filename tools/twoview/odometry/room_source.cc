@@ -269,6 +269,8 @@ RoomSource room_source_of_poses(const std::string& path, const std::string& pose
   for (const std::string& name : source.files()) made.files.push_back(name);
   made.files.push_back(poses);
   made.has_true_poses = true;
+  made.poses_file = poses;
+  made.quaternion_order = given_poses.order;
   made.notes.emplace_back(
       "the unit is that of the poses: whether it is the metre is not known here");
   return made;
@@ -348,9 +350,56 @@ TruePath true_path(const RoomSource& from, const std::string& file) {
     clock.names.push_back(view.name);
   }
   path.problem = fit_times(own, truth, clock);
+  if (path.problem.empty()) path.problem = rotation_words(own, truth);
   path.poses = truth.poses;
   return path;
 }
+
+namespace {
+
+// Throws where what the pictures confirm lies elsewhere than where the given poses put it. Poses of
+// a tracker beside the camera and clocks that differ a little move it by a few pixels alone.
+void require_poses_of_pictures(const RoomSource& from, const PosedPoints& points) {
+  // Shares of the matches that fit. By chance 0.03 to 0.1 do, and as many as a half where a camera
+  // that hardly turns is read in another way.
+  constexpr double kContradicted = 0.2, kFits = 0.5, kClearly = 1.5;
+  std::vector<Pose> poses;
+  for (const RoomView& view : from.scene.views) poses.push_back({view.R, view.t});
+  const auto share_of = [&points](const std::vector<Pose>& read) {
+    std::vector<Matrix3> R;
+    std::vector<Vector3> t;
+    for (const Pose& pose : read) {
+      R.push_back(pose.R);
+      t.push_back(pose.t);
+    }
+    return points.share_that_fits(R, t);
+  };
+  const std::optional<double> share = share_of(poses);
+  if (!share || kClearly * *share >= 1) return;
+  const auto in_percent = [](double value) {
+    return std::to_string(std::lround(100 * value)) + " %";
+  };
+  const std::string found = from.poses_file +
+                            ": the pictures contradict these poses: " + in_percent(*share) +
+                            " of what two pictures see lies where they put it";
+  const PoseReading* best = nullptr;
+  double best_share = std::max(kFits, kClearly * *share);
+  const std::vector<PoseReading> readings = other_readings(poses, from.quaternion_order);
+  for (const PoseReading& reading : readings) {
+    const double fitting = share_of(reading.poses).value_or(0);
+    if (fitting <= best_share) continue;
+    best_share = fitting;
+    best = &reading;
+  }
+  if (best != nullptr)
+    throw BadInput(found + ", and " + in_percent(best_share) + " if they are " + best->words);
+  if (*share >= kContradicted) return;
+  throw BadInput(found +
+                 ". Are they world_from_cam (x right, y down, z ahead), of this camera and not of "
+                 "a body beside it, of these frames, and is the camera file this camera's?");
+}
+
+}  // namespace
 
 void add_posed_points(RoomSource& from, const std::atomic<bool>& stop) {
   RoomScene& scene = from.scene;
@@ -365,6 +414,7 @@ void add_posed_points(RoomSource& from, const std::atomic<bool>& stop) {
                      return true;
                    },
                    stop);
+  require_poses_of_pictures(from, points);
   scene.points = points.points();
 }
 

@@ -18,12 +18,14 @@ namespace cli {
 struct RoomSource {
   std::unique_ptr<FrameSource> source;
   RoomScene scene;
-  Masks masks;                     // of the source's pictures
-  cv::Mat still;                   // what stands still in all of them, 0; may be empty
-  std::string name;                // of the source, for people
-  std::string given;               // as the user or result.json names it
-  std::string truth_file;          // of true poses, that result.json names; empty: none
-  bool has_true_poses = false;     // the poses are given ones, which a truth is in the frame of
+  Masks masks;                  // of the source's pictures
+  cv::Mat still;                // what stands still in all of them, 0; may be empty
+  std::string name;             // of the source, for people
+  std::string given;            // as the user or result.json names it
+  std::string truth_file;       // of true poses, that result.json names; empty: none
+  bool has_true_poses = false;  // the poses are given ones, which a truth is in the frame of
+  std::string poses_file;       // of given poses
+  TruePoses::Order quaternion_order = TruePoses::Order::kKnown;  // of that file
   std::vector<std::string> files;  // that were read, which no output may replace
   std::vector<std::string> notes;
 };
@@ -44,7 +46,8 @@ RoomSource room_source_of_colmap(const std::string& model, const std::string& pi
 // The true poses of the source's frames: of `file`, else those that the source knows, else none.
 TruePath true_path(const RoomSource& from, const std::string& file);
 
-// Finds points for a scene without any, by matching its pictures.
+// Finds points for a scene without any, by matching its pictures. Throws BadInput where the
+// pictures contradict its poses, and says as what they would fit.
 void add_posed_points(RoomSource& from, const std::atomic<bool>& stop);
 
 // The scene of a flight that has just ended: its longest segment.

@@ -25,7 +25,7 @@ nlohmann::ordered_json truth_options_json(const RoomTruthOptions& options);
 struct TruePath {
   bool is_own = false;  // the scene's poses are the true ones
   Trajectory poses;     // world_from_cam, in the frames' times; empty: not known
-  std::string problem;  // of their times
+  std::string problem;  // a line on their times or rotations; empty: none
 };
 
 // The words where --truth-mesh comes without a true path.

@@ -77,7 +77,11 @@ int room(Arguments& a) {
   const std::atomic<bool>& stop = stop_flag_for_signals();
   RoomSource from = source_of(a, stop);
   std::optional<TrueSurface> truth;
-  if (true_room.is_given()) truth = true_room.surface(from.scene, true_path(from, a.true_poses));
+  if (true_room.is_given()) {
+    const TruePath path = true_path(from, a.true_poses);
+    truth = true_room.surface(from.scene, path);
+    if (!path.problem.empty()) from.notes.push_back(path.problem);
+  }
   OutputSet files(common.output);
   for (const std::string& name : from.files) files.keep(name);
   for (const std::string& name : true_room.files()) files.keep(name);

@@ -200,4 +200,33 @@ std::string rotation_words(const Trajectory& estimate, const TruePoses& truth) {
   return text;
 }
 
+std::vector<PoseReading> other_readings(const std::vector<Pose>& poses, TruePoses::Order order) {
+  std::vector<PoseReading> readings;
+  const auto add = [&](const char* words, const auto& read) {
+    readings.push_back({words, {}});
+    for (const Pose& pose : poses) readings.back().poses.push_back(read(pose));
+  };
+  const auto with_opengl_axes = [](const Pose& pose) {
+    return Pose{product(pose.R, {1, 0, 0, 0, -1, 0, 0, 0, -1}), pose.t};
+  };
+  if (order != TruePoses::Order::kKnown) {
+    const bool is_last = order == TruePoses::Order::kScalarLast;
+    add(is_last ? "quaternions with w first: put a line above the poses, # timestamp tx ty tz qw "
+                  "qx qy qz"
+                : "quaternions with w last: put a line above the poses, # timestamp tx ty tz qx qy "
+                  "qz qw",
+        [&](const Pose& pose) {
+          return Pose{in_other_order(pose.R, order), pose.t};
+        });
+  }
+  add("camera_from_world: write the inverse poses", inverse);
+  add("with OpenGL's axes (y up, z backwards): change the sign of the second and the third column "
+      "of each rotation",
+      with_opengl_axes);
+  add("camera_from_world with OpenGL's axes (y up, z backwards): write the inverse poses with the "
+      "sign of the second and the third column of each rotation changed",
+      [&](const Pose& pose) { return with_opengl_axes(inverse(pose)); });
+  return readings;
+}
+
 }  // namespace cli

@@ -31,4 +31,12 @@ std::string fit_times(const Trajectory& estimate, TruePoses& truth, const FrameC
 // body. Empty where the axes agree, or where too little turns.
 std::string rotation_words(const Trajectory& estimate, const TruePoses& truth);
 
+// Poses of a file as another program may have meant them, when they were read as world_from_cam
+// with x to the right, y down and z ahead.
+struct PoseReading {
+  std::string words;  // what the file's poses are then, and what to do
+  std::vector<Pose> poses;
+};
+std::vector<PoseReading> other_readings(const std::vector<Pose>& poses, TruePoses::Order order);
+
 }  // namespace cli

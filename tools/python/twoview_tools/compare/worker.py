@@ -175,6 +175,7 @@ def run_own(views, options, task):
     own_matches.require_pixels(whole, matched, options["file"], may_be_smaller=resize is None)
     scaled = [(p + 0.5) * (np.array(size) / was) - 0.5
               for p, size, was in zip(pixels, views.sizes, matched)]
+    own_matches.require_order(*scaled, views.gray, options["file"])
     kept = np.logical_and(*(kept_by_mask(p, used) for p, used in zip(scaled, views.used)))
     matches = views.matches(*(p[kept] for p in scaled),
                             None if given.ratios is None else given.ratios[kept])
