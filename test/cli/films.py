@@ -27,7 +27,7 @@ def numbers(*values):
 
 
 def mov(pictures, times_s, turn=QUARTERS[0], pixel_aspect=(1, 1), start_s=0.0, timescale=90000,
-        last_s=None, sound_only=False, index_first=False, fields=1):
+        last_s=None, sound_only=False, index_first=False, fields=1, more=b""):
     """pictures: PNG files in the order in which they are stored; times_s: when each is shown, in
     any order (composition offsets then say so). start_s: an empty edit before the first picture.
     last_s: how long the last one is shown. fields: 2 where the rows are of two fields. index_first:
@@ -52,7 +52,7 @@ def mov(pictures, times_s, turn=QUARTERS[0], pixel_aspect=(1, 1), start_s=0.0, t
                      struct.pack(">HH", width, height), numbers(72 << 16, 72 << 16, 0),
                      struct.pack(">H", 1), bytes(32), struct.pack(">Hh", 24, -1),
                      atom(b"fiel", bytes([fields, 9 if fields == 2 else 0])),
-                     atom(b"pasp", numbers(*pixel_aspect)))
+                     atom(b"pasp", numbers(*pixel_aspect)), more)
         if sound_only:
             entry = atom(b"sowt", bytes(6), struct.pack(">H", 1), bytes(8),
                          struct.pack(">HHHH", 1, 16, 0, 0), numbers(8000 << 16))

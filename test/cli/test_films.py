@@ -4,7 +4,7 @@ are not square, and films that are cut off or hold no pictures."""
 import math
 
 from cli_support import CliTest, camera_yaml, main, png
-from films import MIRROR, QUARTERS, mov
+from films import MIRROR, QUARTERS, atom, full, mov
 from test_odometry import COUNT, FOCAL, FPS, HEIGHT, LUMA, PICTURES, TIMES, TUM_TRUTH, WIDTH
 
 # Two rates, as phones film when the light goes: 25 and then 10 pictures a second.
@@ -166,6 +166,18 @@ class Films(CliTest):
         self.assert_right(result)
         self.assertTrue(result["film"]["interlaced"])
         self.assertIn("the film is interlaced by its container", " ".join(result["notes"]))
+
+    def test_films_of_360_degrees_and_of_two_eyes_are_refused(self):
+        equirectangular = atom(
+            b"sv3d", full(b"svhd", b"a test\0"),
+            atom(b"proj", full(b"prhd", bytes(12)), full(b"equi", bytes(16))))
+        for words, more in ((("360 degrees", "equirectangular"), equirectangular),
+                            (("two eyes", "side by side"), full(b"st3d", b"\2")),
+                            (("two eyes", "top"), full(b"st3d", b"\1"))):
+            with self.subTest(words):
+                path = self.write("film.mov", mov(PICTURES, TIMES, more=more))
+                self.assert_refused(self.odometry(path, "--focal-35mm", 26), "film.mov", *words)
+        self.assert_right(self.track(mov(PICTURES, TIMES, more=full(b"st3d", b"\0"))))
 
     def test_films_that_were_joined_as_bytes_are_named(self):
         half = COUNT // 2

@@ -83,6 +83,19 @@ def larger(image, factor):
     return png(WIDTH * factor, HEIGHT * factor, b"".join(rows))
 
 
+class Panoramas(cli.CliTest):
+    def test_pictures_of_360_degrees_are_refused(self):
+        for xmp in (b'<x:d GPano:ProjectionType="equirectangular"/>',
+                    b"<GPano:ProjectionType>equirectangular</GPano:ProjectionType>"):
+            segment = b"http://ns.adobe.com/xap/1.0/\0" + xmp
+            path = self.write("theta.jpg", b"\xff\xd8\xff\xe1"
+                              + struct.pack(">H", len(segment) + 2) + segment
+                              + b"\xff\xc0\0\x0b\x08\0\x10\0\x20\1\1\x11\0\xff\xda\0\2\xff\xd9")
+            self.a = path
+            self.assert_refused(self.reconstruct("--focal-35mm", "26", camera=False), "theta.jpg",
+                                "panorama (equirectangular, by its XMP)")
+
+
 class Exif(cli.CliTest):
     def photographs(self, *data):
         """The paths of both images with EXIF data of their own, or of one for both."""

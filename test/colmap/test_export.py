@@ -19,7 +19,7 @@ import twoview as tv
 from twoview_tools.colmap import exporter, schema38, settings
 from twoview_tools.colmap.database import appended_database
 from twoview_tools.colmap.errors import BadInput
-from twoview_tools.colmap.images import holds_more
+from twoview_tools.colmap.images import decode, holds_more
 from conftest import CAMERA, CX, CY, HEIGHT, NAMES, WIDTH, run, start
 
 pycolmap = pytest.importorskip("pycolmap")
@@ -615,6 +615,19 @@ def test_files_of_several_pictures_are_named(tmp_path):
             path = tmp_path / f"{len(more)}.{ending}"
             pages[0].save(path, save_all=bool(more), append_images=more)
             assert holds_more(path) == bool(more), path
+
+
+def test_a_picture_of_360_degrees_is_refused(tmp_path):
+    Image = pytest.importorskip("PIL.Image")
+    path = tmp_path / "theta.jpg"
+    for kind, is_refused in (("equirectangular", True), ("rectilinear", False)):
+        Image.new("L", (32, 24), 9).save(
+            path, xmp=f'<x GPano:ProjectionType="{kind}"/>'.encode())
+        if is_refused:
+            with pytest.raises(BadInput, match="a panorama .equirectangular, by its XMP"):
+                decode(str(path))
+        else:
+            assert decode(str(path)).shape == (24, 32)
 
 
 def test_bad_arguments_are_one_line(tmp_path, refuse):

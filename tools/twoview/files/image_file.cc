@@ -103,6 +103,9 @@ cv::Mat decode(const std::string& path, const std::string& bytes) {
                      std::to_string(kMaxSide) + " a side");
   };
   refuse_huge(header.width, header.height);
+  if (!header.panorama.empty() && header.panorama != "rectilinear")
+    throw BadInput("image " + path + " is a panorama (" + std::string(header.panorama) +
+                   ", by its XMP), and no camera here describes it: cut flat views out of it");
   cv::Mat pixels;
   try {
     const StderrSilence silence;  // libpng, libjpeg, libtiff and OpenCV print messages

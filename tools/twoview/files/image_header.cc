@@ -36,6 +36,20 @@ ImageHeader read_png(Bytes bytes) {
   return header;
 }
 
+// What Google's GPano schema says in a JPEG's XMP, as an attribute or as an element. 360-degree
+// cameras and phones that stitch write it.
+Bytes panorama_in(Bytes xmp) {
+  constexpr Bytes kId("http://ns.adobe.com/xap/1.0/\0", 29), kName("GPano:ProjectionType");
+  if (!starts_with(xmp, kId)) return {};
+  const size_t name = xmp.find(kName);
+  if (name == Bytes::npos) return {};
+  const size_t begin = xmp.find_first_not_of(" \t\r\n=\"'>", name + kName.size());
+  if (begin == Bytes::npos) return {};
+  size_t end = begin;
+  while (end < xmp.size() && std::isalnum(static_cast<unsigned char>(xmp[end])) != 0) ++end;
+  return xmp.substr(begin, end - begin);
+}
+
 ImageHeader read_jpeg(Bytes bytes) {
   ImageHeader header;
   header.truncated = true;
@@ -57,7 +71,10 @@ ImageHeader read_jpeg(Bytes bytes) {
       header.truncated = bytes.find("\xff\xd9", at) == Bytes::npos;
       return header;
     }
-    at += 2 + static_cast<size_t>(number(bytes, at + 2, 2, true));
+    const auto length = static_cast<size_t>(number(bytes, at + 2, 2, true));
+    if (marker == 0xe1 && length > 2 && header.panorama.empty())
+      header.panorama = panorama_in(bytes.substr(at + 4, length - 2));
+    at += 2 + length;
   }
   return header;
 }

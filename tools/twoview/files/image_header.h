@@ -14,6 +14,9 @@ struct ImageHeader {
   bool is_binary_pnm = false;     // P5 or P6
   bool has_more = false;          // TIFF: pages but for previews and masks; PNG, WebP: animated
   bool truncated = false;         // the file ends early: PNG, JPEG, binary PNM
+  // JPEG: what a panorama's XMP says of its projection, such as "equirectangular"; else empty. It
+  // lies in the bytes that were read.
+  std::string_view panorama;
 };
 
 // Parses the headers of PNG, JPEG, BMP, PNM and TIFF, and whether WebP is animated. It never fails

@@ -130,6 +130,13 @@ Film::Film(const std::string& path, double fps) : state_(std::make_unique<State>
   if (!s.container.has_pictures)
     throw BadInput("cannot read " + path + ": it has no pictures" +
                    (s.container.has_sound ? ", only sound" : ""));
+  if (!s.container.projection.empty())
+    throw BadInput(path + " is a film of 360 degrees (" + s.container.projection +
+                   ", by its container), and no camera here describes it: cut a flat view out of "
+                   "it (ffmpeg -vf v360)");
+  if (!s.container.eyes.empty())
+    throw BadInput(path + " is a film of two eyes (" + s.container.eyes +
+                   ", by its container): cut the pictures of one out of it (ffmpeg -vf stereo3d)");
   if (!open_capture(s.capture, path))
     throw BadInput("cannot read " + path +
                    ": it is no film that OpenCV reads, or is cut off: record "

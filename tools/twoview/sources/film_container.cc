@@ -7,6 +7,8 @@
 extern "C" {
 #include <libavformat/avformat.h>
 #include <libavutil/display.h>
+#include <libavutil/spherical.h>
+#include <libavutil/stereo3d.h>
 }
 
 #include <algorithm>
@@ -23,18 +25,19 @@ struct Close {
 };
 using Open = std::unique_ptr<AVFormatContext, Close>;
 
-const int32_t* display_matrix(const AVStream& stream) {
+// What the container says beside the stream; null where it is not there, or shorter than T.
+template <class T>
+const T* side_data(const AVStream& stream, AVPacketSideDataType type, size_t count = 1) {
 #if LIBAVFORMAT_VERSION_MAJOR >= 61
-  const AVPacketSideData* const data =
-      av_packet_side_data_get(stream.codecpar->coded_side_data, stream.codecpar->nb_coded_side_data,
-                              AV_PKT_DATA_DISPLAYMATRIX);
-  return data != nullptr && data->size >= 9 * sizeof(int32_t)
-             ? reinterpret_cast<const int32_t*>(data->data)
-             : nullptr;
+  const AVPacketSideData* const found = av_packet_side_data_get(
+      stream.codecpar->coded_side_data, stream.codecpar->nb_coded_side_data, type);
+  const uint8_t* const data = found != nullptr ? found->data : nullptr;
+  const size_t size = found != nullptr ? found->size : 0;
 #else
-  return reinterpret_cast<const int32_t*>(
-      av_stream_get_side_data(&stream, AV_PKT_DATA_DISPLAYMATRIX, nullptr));
+  size_t size = 0;
+  const uint8_t* const data = av_stream_get_side_data(&stream, type, &size);
 #endif
+  return size >= count * sizeof(T) ? reinterpret_cast<const T*>(data) : nullptr;
 }
 
 double seconds(int64_t time, AVRational unit) {
@@ -52,6 +55,20 @@ void add_turn(const int32_t* matrix, FilmContainer& film) {
   if (film.is_mirrored) a = -a, b = -b;
   const double degrees = std::atan2(b, a) * 57.29577951308232;
   film.turn_deg = std::fmod(degrees + 360, 360);
+}
+
+// Whether the pictures hold those of two eyes, or are one eye's and the other's in turn.
+bool is_packed(AVStereo3DType type) {
+  switch (type) {
+    case AV_STEREO3D_SIDEBYSIDE:
+    case AV_STEREO3D_TOPBOTTOM:
+    case AV_STEREO3D_FRAMESEQUENCE:
+    case AV_STEREO3D_CHECKERBOARD:
+    case AV_STEREO3D_SIDEBYSIDE_QUINCUNX:
+    case AV_STEREO3D_LINES:
+    case AV_STEREO3D_COLUMNS: return true;
+    default: return false;
+  }
 }
 
 Open open_film_file(const std::string& path) {
@@ -115,7 +132,14 @@ FilmContainer read_film_container(const std::string& path) {
   if (aspect > 0) result.pixel_aspect = aspect;
   const AVFieldOrder order = pictures->codecpar->field_order;
   result.is_interlaced = order != AV_FIELD_UNKNOWN && order != AV_FIELD_PROGRESSIVE;
-  if (const int32_t* const matrix = display_matrix(*pictures)) add_turn(matrix, result);
+  if (const auto* const matrix = side_data<int32_t>(*pictures, AV_PKT_DATA_DISPLAYMATRIX, 9))
+    add_turn(matrix, result);
+  if (const auto* const sphere = side_data<AVSphericalMapping>(*pictures, AV_PKT_DATA_SPHERICAL))
+    result.projection = av_spherical_projection_name(sphere->projection);
+  // Newer versions know a rectilinear projection, which is a flat view.
+  if (result.projection == "rectilinear") result.projection.clear();
+  if (const auto* const stereo = side_data<AVStereo3D>(*pictures, AV_PKT_DATA_STEREO3D))
+    if (is_packed(stereo->type)) result.eyes = av_stereo3d_type_name(stereo->type);
   return result;
 }
 

@@ -22,6 +22,9 @@ struct FilmContainer {
   bool is_mirrored = false;
   double pixel_aspect = 1;
   bool is_interlaced = false;  // stored as two fields, which may be of two moments
+  // The projection of a 360-degree film, such as "equirectangular", and how a film of two eyes has
+  // both in its pictures, such as "side by side"; empty for a film of one flat view.
+  std::string projection, eyes;
 };
 
 // Throws BadInput where the file is of no format that libavformat knows.

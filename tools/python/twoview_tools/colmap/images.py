@@ -72,6 +72,17 @@ def _white(path):
     return white if white > 255 or head[1:2] in b"56" else 0
 
 
+def _panorama(path):
+    """What the XMP of a JPEG panorama says of its projection, such as "equirectangular"; else ""."""
+    with open(path, "rb") as file:
+        head = file.read(1 << 17)
+    if head[:3] != b"\xff\xd8\xff":
+        return ""
+    found = re.search(rb"ns\.adobe\.com/xap/1\.0/\0.*?GPano:ProjectionType[\s=\"'>]+([A-Za-z0-9]+)",
+                      head, re.DOTALL)
+    return found[1].decode() if found and found[1] != b"rectilinear" else ""
+
+
 def _to_8_bits(image, low, high):
     """Samples so that `low` becomes 0 and `high` 255, rounded; beyond them they are cut off."""
     above = np.clip(image.astype(np.int64) - low, 0, high - low)
@@ -96,6 +107,9 @@ def decode(path, keeps_depth=False):
         unread = unread_picture(path)
         raise BadInput(f"image {path} {unread}" if unread else
                        f"image {path} is no image that OpenCV reads")
+    if panorama := _panorama(path):
+        raise BadInput(f"image {path} is a panorama ({panorama}, by its XMP), and no camera here "
+                       "describes it: cut flat views out of it")
     white = _white(path)
     if image.dtype == np.uint8 and 0 < white < 255:
         image = _to_8_bits(image, 0, white)
