@@ -2,6 +2,8 @@
 """Tests of twoview triangulate: points from matched pixels and a known pose."""
 import csv
 import json
+import math
+import shutil
 import struct
 import unittest
 
@@ -186,6 +188,28 @@ class Triangulate(cli.CliTest):
         self.assert_refused(self.triangulate(), "cam.yaml", "fx")
         for value in ("0", "nan", "2e9"):
             self.assert_refused(self.triangulate("--max-error-px", value), "--max-error-px")
+
+    def test_a_pose_that_the_matches_contradict_is_refused(self):
+        """Camera 1 is turned by 30 degrees about y, and looks at the same points from its side."""
+        c, s = math.cos(math.radians(30)), math.sin(math.radians(30))
+        R = ((c, 0, -s), (0, 1, 0), (s, 0, c))
+        place = (-3.0, 0.1, 0.9)  # of camera 1 in camera 0
+        turned = lambda p: tuple(sum(a * b for a, b in zip(row, p)) for row in R)
+        t = tuple(-v for v in turned(place))
+        points = [((k % 6 - 2.5) / 4, (k // 6 - 2) / 4, 4 + 0.3 * (k % 4)) for k in range(30)]
+        rows = [(*pixel(p), *pixel(tuple(a + b for a, b in zip(turned(p), t)))) for p in points]
+        matches = self.write("30.txt", "\n".join(" ".join(map(repr, row)) for row in rows))
+        inverse = [[R[j][i] for j in range(3)] for i in range(3)]
+
+        def pose(rotation, t):
+            self.pose.write_text(f"R: {[v for row in rotation for v in row]}\nt: {list(t)}\n")
+            return self.triangulate(matches=matches)
+
+        self.assertIn(b"30 points of 30 matches", self.succeed(pose(R, t)).stdout)
+        shutil.rmtree(self.out)
+        self.assert_refused(pose(inverse, place), "pose.yaml", "0 % of them", "100 % if",
+                            "cam0_from_cam1")
+        self.assert_refused(pose(R, place), "100 % if", "the place of camera 1")
 
     def test_a_refined_focal_length_is_used_and_a_broken_one_refused(self):
         pose = self.pose.read_text()

@@ -1,9 +1,11 @@
 // twoview triangulate MATCHES: computes points from matched pixels and a known pose.
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <utility>
 
 #include "base/error.h"
 #include "base/output.h"
@@ -128,24 +130,70 @@ ImageCameras matched_cameras(Arguments& a, const KnownPose& pose) {
   return cameras;
 }
 
+// Returns true if the cloud should hold the point: it is in front of both cameras and not
+// at infinity, and its reprojection error is at most max_error_px.
+bool is_wanted(const tv_point& point, double max_error_px) {
+  return point.status == TV_POINT_OK && static_cast<double>(point.error_px) <= max_error_px;
+}
+
+using Pose3 = std::pair<Matrix3, Vector3>;
+
+Pose3 inverse(const Pose3& pose) {
+  const Matrix3 R = transposed(pose.first);
+  Vector3 t = applied(R, pose.second);
+  for (double& value : t) value = -value;
+  return {R, t};
+}
+
+// Throws where the matches contradict the pose and confirm another reading of its numbers.
+// share_of: of a pose, the share of the matches that meet in front of both cameras.
+template <class ShareOf>
+void require_direction(const Arguments& a, const Pose3& pose, const ShareOf& share_of) {
+  constexpr double kContradicted = 0.2, kConfirmed = 0.5;
+  const double share = share_of(pose);
+  if (share >= kContradicted) return;
+  const Vector3 turned = applied(pose.first, pose.second);
+  const struct {
+    const char* words;
+    Pose3 pose;
+  } readings[] = {
+      {"are of cam0_from_cam1, or the matches of the images in the other order", inverse(pose)},
+      {"are cam1_from_cam0's rotation and the place of camera 1 in camera 0 (t = -R place)",
+       {pose.first, {-turned[0], -turned[1], -turned[2]}}},
+  };
+  for (const auto& reading : readings)
+    if (const double other = share_of(reading.pose); other > kConfirmed)
+      throw BadInput(a.pose + ": the matches contradict this pose: " +
+                     std::to_string(std::lround(100 * share)) +
+                     " % of them meet in front of both cameras, and " +
+                     std::to_string(std::lround(100 * other)) + " % if R and t " + reading.words);
+}
+
 std::vector<tv_point> triangulated(Arguments& a, const MatchList& matches, const KnownPose& pose,
                                    const ImageCameras& cameras) {
+  constexpr size_t kTelling = 20;  // matches
   require_inside(a, matches, cameras);
   const tv_camera camera[2] = {pose.corrected(cameras[0].camera),
                                pose.corrected(cameras[1].camera)};
   std::vector<tv_point> points(matches.size());
   const auto method = static_cast<tv_triangulation>(a.common.options.triangulation);
-  check(tv_triangulate(method, &camera[0], &camera[1], pose.R.data(), pose.t.data(),
-                       matches.pixels[0].data(), matches.pixels[1].data(),
-                       static_cast<int32_t>(points.size()), points.data()),
-        "cannot triangulate " + a.matches);
+  const auto triangulate = [&](const Pose3& by) {
+    check(tv_triangulate(method, &camera[0], &camera[1], by.first.data(), by.second.data(),
+                         matches.pixels[0].data(), matches.pixels[1].data(),
+                         static_cast<int32_t>(points.size()), points.data()),
+          "cannot triangulate " + a.matches);
+  };
+  const auto share_of = [&](const Pose3& by) {
+    triangulate(by);
+    const auto count = std::count_if(points.begin(), points.end(), [&a](const tv_point& point) {
+      return is_wanted(point, a.max_error_px);
+    });
+    return static_cast<double>(count) / static_cast<double>(points.size());
+  };
+  const Pose3 given{pose.R, pose.t};
+  if (matches.size() >= kTelling) require_direction(a, given, share_of);
+  triangulate(given);
   return points;
-}
-
-// Returns true if the cloud should hold the point: it is in front of both cameras and not
-// at infinity, and its reprojection error is at most max_error_px.
-bool is_wanted(const tv_point& point, double max_error_px) {
-  return point.status == TV_POINT_OK && static_cast<double>(point.error_px) <= max_error_px;
 }
 
 std::vector<CloudPoint> cloud(const std::vector<tv_point>& points, double max_error_px) {
