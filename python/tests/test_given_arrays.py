@@ -135,6 +135,8 @@ def test_a_camera_of_a_matrix():
     (([[0, 0, 160], [0, 300, 120], [0, 0, 1]],), {}, ValueError, "focal length"),
     (([[np.nan, 0, 160], [0, 300, 120], [0, 0, 1]],), {}, ValueError, "not finite"),
     (([[300, 0, -9], [0, 300, 120], [0, 0, 1]],), {}, ValueError, "principal point"),
+    (([[0.9, 0, 0.5], [0, 1.2, 0.5], [0, 0, 1]],), {"size": (640, 480)}, ValueError, "normalised"),
+    (([[300, 0, 1600], [0, 300, 120], [0, 0, 1]],), {"size": (320, 240)}, ValueError, "cx is 1600"),
     ((K, 640, 480), {}, TypeError, "size="),
     ((K,), {"size": 640}, ValueError, "size"),
     ((K,), {"distortion": [0.1] * 12}, ValueError, "12 coefficients"),

@@ -11,7 +11,7 @@ import math
 import re
 from typing import Any, Callable, Iterator, Mapping, NamedTuple, Optional, Sequence
 
-from .camera import Camera
+from .camera import FARTHEST_CENTER, SHORTEST_FOCAL, Camera
 from .enums import CameraModel
 
 NUM_MODELLED = 8  # coefficients k1 k2 p1 p2 k3 k4 k5 k6 of a Camera
@@ -80,9 +80,6 @@ _SUSPECT_WHOLE = re.compile(
     "gamma|[kpsbdmar][0-9]+|ks|ps|tau[xy]?|tx|ty|poly[0-9]*|invpol.*|[hvd]?fov|cols|rows|mtx|type")
 # Of these a value of 0 says that there is none.
 _ZERO_IS_NONE = re.compile("[kpsb][0-9]+|[abc]|skew|tau[xy]?|tx|ty|radial|tangential|xi")
-
-FARTHEST_CENTER = 1.0  # image sides that the principal point may lie outside the image
-SHORTEST_FOCAL = 0.02  # of the image's side: 176 degrees of a pinhole; below it is another unit
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE | re.ASCII)
 _NOT_FINITE = re.compile(r"[+-]?\.?(nan|inf|infinity)", re.IGNORECASE)

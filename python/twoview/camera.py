@@ -13,6 +13,9 @@ from numpy.typing import ArrayLike
 from . import _abi
 from .enums import CameraModel
 
+SHORTEST_FOCAL = 0.02  # of the image's side: 176 degrees of a pinhole; below it is another unit
+FARTHEST_CENTER = 1.0  # image sides that the principal point may lie outside the image
+
 
 @dataclass(frozen=True, eq=False, init=False)
 class Camera:
@@ -139,6 +142,12 @@ def _of_matrix(matrix: Any, size: Any) -> tuple[int, int, float, float, float, f
             raise ValueError("K: the principal point is not in an image; give size=(width, height)")
     if np.shape(size) != (2,):
         raise ValueError(f"size: (width, height) is expected, not {size!r}")
+    for side, focal, center, axis in zip(size, (K[0, 0], K[1, 1]), K[:2, 2], "xy"):
+        if focal < SHORTEST_FOCAL * side:
+            raise ValueError(f"K: f{axis} is {focal:g} pixels for an image of {side}: is it in "
+                             "another unit, as a normalised matrix is?")
+        if not -FARTHEST_CENTER * side <= center <= (1 + FARTHEST_CENTER) * side:
+            raise ValueError(f"K: c{axis} is {center:g}, far outside an image of {side} pixels")
     return (int(size[0]), int(size[1]), float(K[0, 0]), float(K[1, 1]), float(K[0, 2]),
             float(K[1, 2]))
 

@@ -82,6 +82,7 @@ class Truths(CliTest):
                 (("line 2", "length 90"), "0 0 0 0 0 0 0 1\n1 0 0 0 0 0 90 0\n"),
                 (("line 1", "no rotation"), "2 0 0 0 0 2 0 0 0 0 2 0\n"),
                 (("line 1", "no rotation", "0.03"), "1.03 0 0 0 0 1 0 0 0 0 1 0\n"),
+                (("binary file",), "ULog\1\x12\0\1\x1b[1m\n"),
                 (("line 1", "reflection"), "1 0 0 0 0 1 0 0 0 0 -1 0\n")):
             self.assert_refused(self.run_with(text), "truth.csv", *words)
 

@@ -235,6 +235,8 @@ std::string tum_line(double time_s, const Pose& pose) {
 TruePoses load_trajectory(const std::string& file, const std::vector<double>& frame_times,
                           const std::optional<std::array<double, 12>>& body_from_camera) {
   const std::string text = read_file(file, kMaxFileBytes);
+  if (text.find('\0') != text.npos)
+    throw BadInput(file + " is a binary file, no text of poses (TUM's, EuRoC's or KITTI's lines)");
   std::vector<TextLine> lines = lines_of(text);
   if (lines.empty()) throw BadInput(file + ": no pose in it");
   double ignored = 0;
