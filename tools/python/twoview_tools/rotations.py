@@ -2,7 +2,7 @@
 
 import numpy as np
 
-MOST_ROTATION_ERROR = 0.01  # of an element; tools/twoview/base/matrix.h has the same
+MOST_ROTATION_ERROR = 0.01  # of an entry of the matrix, as in tools/twoview/base/matrix.h
 
 
 def made_rotation(matrix, name):

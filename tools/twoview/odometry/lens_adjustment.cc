@@ -32,7 +32,7 @@ using Vec2 = cv::Matx21d;
 // keyframes the steps of a turning car had to be ten times as small.
 constexpr size_t kWindow = 16, kLeastViews = 3, kMostWindows = 15;
 constexpr double kLossScale = 1;  // pixels of sigma 1, of Cauchy's loss
-constexpr double kLostCost = 20;  // of an observation that a step brings behind its camera
+constexpr double kLostCost = 20;  // cost of an observation that comes behind its camera
 // The covariance is that of the noise times this: what else bends a lens, and errors that the views
 // of a point share, do not average out. Chosen, with less of the lens free, on seq_tsukuba,
 // seq_corridor, seq_tum_fr1_rpy and three rendered flights (docs/algorithms/focal_length.md).

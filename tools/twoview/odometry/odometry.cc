@@ -249,7 +249,7 @@ std::string estimated_camera_text(const FilmLens& lens) {
 
 // The room of a flight as files, words and a part of the page; empty where none is made.
 struct FlightRoom {
-  std::string html, script, summary;  // of the page, and lines
+  std::string html, script, summary;  // parts of the page, and lines of the summary
 #ifdef TWOVIEW_HAS_ROOM
   RoomScene scene;
   std::optional<RoomModel> model;

@@ -150,7 +150,7 @@ std::string rotation_words(const Trajectory& estimate, const TruePoses& truth) {
   // Turns are compared over a twentieth of the path, over which they are well above their errors.
   constexpr size_t kSteps = 20;
   constexpr double kSameAngle = 0.2, kOtherAxis = 0.5;  // errors as shares of the turns
-  constexpr double kClear = 3;  // of two orders the right one is that of so much smaller errors
+  constexpr double kClear = 3;  // how much smaller the errors of the right order must be
   const std::vector<Association> pairs = associated(estimate, truth.poses);
   const size_t step = std::max<size_t>(1, pairs.size() / kSteps);
   double turn = 0, of_angle = 0, of_axis = 0, of_other = 0;

@@ -9,7 +9,7 @@
 
 namespace cli {
 
-// What a truth's times may count.
+// The clocks that a truth's times may follow.
 struct FrameClock {
   double film_start_s = 0;  // of the film's own clock
   // Of each frame of the source that was used: its number from 0, its time and its name.

@@ -8,7 +8,7 @@ namespace cli {
 
 MapView view_of(const Flight& flight, const std::vector<FlightKeyframe>& keyframes,
                 int32_t segment) {
-  constexpr double kLevel = 0.9994;  // of 2 degrees: the z axis points down
+  constexpr double kLevel = 0.9994;  // cosine of 2 degrees, within which z points down
   const std::optional<Vector3> measured = flight.down(segment);
   if (measured && (*measured)[2] > kLevel) return {{0, 1, 0, 0, 0, 1, 1, 0, 0}, true};
   std::vector<Matrix3> held;

@@ -80,7 +80,7 @@ bool look_alike(const cv::Mat& a, const double* pixel_a, const cv::Mat& b, const
 // good then, but of the other direction.
 void require_order(const Picture pictures[2], const std::string& name, const MatchList& matches) {
   constexpr size_t kMost = 400;   // matches that are looked at
-  constexpr double kShare = 0.2;  // of them that are alike with the sides exchanged
+  constexpr double kShare = 0.2;  // least share of them that agree with the sides exchanged
   constexpr double kClearly = 5;  // times as many as in the order of the file
   const size_t step = 1 + matches.size() / kMost;
   size_t count = 0, as_given = 0, exchanged = 0;

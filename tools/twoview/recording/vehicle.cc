@@ -45,7 +45,7 @@ class PacketLog {
     if (!read(head, sizeof head)) return false;
     uint64_t time_us = 0;
     for (int k = 0; k < 8; ++k) time_us = time_us << 8 | head[k];
-    if (time_us > uint64_t{1} << 51) return false;  // in 2041
+    if (time_us > uint64_t{1} << 51) return false;  // a time after 2041
     time_us &= ~kLinkBits;
     size_t size = 0;
     if (head[8] == 0xfd) {

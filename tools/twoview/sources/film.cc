@@ -52,7 +52,7 @@ bool clock_runs(const std::string& path) {
   if (!open_capture(film, path) || film.getBackendName() != "FFMPEG") return false;
   double first = 0;
   for (int k = 0; k < kClockTrials; ++k) {
-    if (!film.grab()) return k < 2;  // of a single picture there is nothing to tell
+    if (!film.grab()) return k < 2;  // one picture alone shows no clock that stands
     if (k == 0) first = position_s(film);
     if (position_s(film) > first) return true;
   }
@@ -75,7 +75,7 @@ struct Film::State {
   double step_s = 0;  // between two pictures, where the times come from a rate
   StreamClock clock;
   double first_s = 0;  // the container's time of the first picture
-  double clock_s = 0;  // of the picture before, since then
+  double clock_s = 0;  // the container's time of the picture before, from first_s on
   double time_s = 0;
   int64_t index = -1, num_pictures = 0;
   std::vector<double> times;  // of the container, where OpenCV does not say a picture's

@@ -27,9 +27,9 @@ class StreamClock {
   std::string note(const std::string& whose) const;
 
  private:
-  std::optional<double> last_;  // of the last picture that was given, by its clock
-  double fallen_s_ = 0;         // of the last one that was not
-  int num_fallen_ = 0;          // of these in a row that rise
+  std::optional<double> last_;  // clock's time of the last picture that was used
+  double fallen_s_ = 0;         // clock's time of the last picture that was left out
+  int num_fallen_ = 0;          // how many left out in a row have rising times
   double shift_s_ = 0, first_s_ = 0;
   bool began_anew_ = false;
   int64_t num_left_out_ = 0, num_begun_anew_ = 0;

@@ -32,7 +32,7 @@ SIZES = (1, 0.71, 0.5, 0.35)
 SEEDS = 20  # pairs of each rendered line that is drawn
 SCENE_SEEDS = 10  # pairs of each scene
 PERIODS = (16, 24, 40, 64, 100)  # of the patterns, in pixels of the texture
-MOST_REASONS = 3  # in a line of the table
+MOST_REASONS = 3  # that a line of the table names
 
 # Changes of a picture: {line: (function of pictures, its arguments)}. The camera follows the
 # picture, so that the pose stays known.

@@ -17,7 +17,7 @@ from . import datasets, estimators, pipeline, twoview_ctypes
 
 SCHEMES = ((3, 1), (4, 1), (5, 1), (6, 1), (8, 2), (12, 3))  # bands, and the farthest one compared
 MOST = 2000  # matches and descriptors of a set that the choice reads, so that sets count alike
-REGULARISATION = 1e-3  # of the spread's mean over the 128 bytes
+REGULARISATION = 1e-3  # added to each variance, as a share of the mean over the 128 bytes
 FAR = 1e9
 
 

@@ -35,7 +35,7 @@ UPRIGHT_OFFSET = 172  # in map.twm (docs/formats.md, the bytes of a map)
 UNKNOWN = np.array([-1.0] + [0.0] * 35)  # a covariance, as sensor_msgs has it
 PACKAGES = ("builtin_interfaces/", "geometry_msgs/", "nav_msgs/", "sensor_msgs/", "tf2_msgs/",
             "std_msgs/msg/Header")
-FLOAT32, UINT32 = 7, 6  # of PointField
+FLOAT32, UINT32 = 7, 6  # PointField's numbers for these types
 FOREVER = QosTime(0, 0)
 # A player must repeat tf_static to those who come later.
 LATCHED = Qos(QosHistory.KEEP_LAST, 1, QosReliability.RELIABLE, QosDurability.TRANSIENT_LOCAL,

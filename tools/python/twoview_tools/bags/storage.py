@@ -43,7 +43,7 @@ class Topic:
     name: str
     type: str  # as in sensor_msgs/msg/Image, for ROS 1, too
     encoding: str  # "ros1", "cdr", or another one of MCAP
-    definition: str = ""  # of the type, where the bag brings it
+    definition: str = ""  # the text that defines the type, where the bag has it
     definition_format: str = ""  # "ros1msg", "ros2msg", "ros2idl", or another one of MCAP
 
 
@@ -163,7 +163,7 @@ class Ros1File:
                         chunk = _uncompressed(fields[b"compression"].decode("ascii", "replace"),
                                               chunk[:file.readinto(chunk)])
                         yield from self._of_chunk(memoryview(chunk), connections, wanted)
-                    elif op in (b"\x02", b"\x07") and is_whole:  # not in a chunk
+                    elif op in (b"\x02", b"\x07") and is_whole:  # a record outside any chunk
                         yield from self._message(fields, file.read(length), connections, wanted)
                     else:
                         file.seek(length, os.SEEK_CUR)

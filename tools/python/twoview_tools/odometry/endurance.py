@@ -10,7 +10,7 @@ from . import poses
 from .sets import read_set, write_frames
 
 NUM_FRAMES, NUM_RUNS = 10000, 3
-GROWTH = 1.10  # of the mean time a frame that counts as flat
+GROWTH = 1.10  # a mean time a frame that grows by no more counts as flat
 
 
 def period_of(count):

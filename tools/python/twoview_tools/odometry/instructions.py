@@ -13,7 +13,7 @@ from .sets import read_set
 
 ARCHITECTURES = (("aarch64", "aarch64-linux-gnu-gcc", "qemu-aarch64"),
                  ("armv7", "arm-linux-gnueabihf-gcc", "qemu-arm"))
-NUM_FRAMES = (30, 60)  # of the two runs
+NUM_FRAMES = (30, 60)  # of two runs, whose difference is measured
 EXAMPLE = os.path.join(ROOT, "examples", "13_odometry.c")
 
 

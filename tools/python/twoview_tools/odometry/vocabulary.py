@@ -14,7 +14,7 @@ import numpy as np
 
 BRANCHES, LEVELS = 10, 5
 MIN_LEAF = 4  # descriptors below which a node is not divided
-ROUNDS = 6  # of k-majority
+ROUNDS = 6  # iterations of the clustering by k-majority
 SEED = 1
 _BITS = np.array([bin(value).count("1") for value in range(256)], np.uint8)
 
