@@ -78,8 +78,8 @@ def _panorama(path):
         head = file.read(1 << 17)
     if head[:3] != b"\xff\xd8\xff":
         return ""
-    found = re.search(rb"ns\.adobe\.com/xap/1\.0/\0.*?GPano:ProjectionType[\s=\"'>]+([A-Za-z0-9]+)",
-                      head, re.DOTALL)
+    found = re.search(rb"ns\.adobe\.com/xap/1\.0/\0.*?GPano:ProjectionType[\s=\"'>]+(\w+)", head,
+                      re.DOTALL)
     return found[1].decode() if found and found[1] != b"rectilinear" else ""
 
 
