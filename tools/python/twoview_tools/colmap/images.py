@@ -73,7 +73,7 @@ def _white(path):
 
 
 def _panorama(path):
-    """What the XMP of a JPEG panorama says of its projection, such as "equirectangular"; else ""."""
+    """What a JPEG panorama's XMP says of its projection, such as "equirectangular"; else ""."""
     with open(path, "rb") as file:
         head = file.read(1 << 17)
     if head[:3] != b"\xff\xd8\xff":
