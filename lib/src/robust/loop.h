@@ -34,7 +34,7 @@ struct LoopOptions {
   int fixed_iterations;        // number of iterations; 0: the stop is adaptive
   int few_inliers_iterations;  // the least number of iterations is this / inliers, up to
                                // kMostForFewInliers
-  int least_inliers = 0;       // a model whose cost excludes so many inliers is not refined
+  int least_inliers = 0;       // a model whose cost shows that it has fewer is not refined
 };
 
 template <typename Model>

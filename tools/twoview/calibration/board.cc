@@ -188,7 +188,8 @@ void look_for_any_board(const cv::Mat& small, cv::Size inner, Found& found) {
   cv::Size seen = meta.size();
   if ((seen.width < seen.height) != (inner.width < inner.height))
     std::swap(seen.width, seen.height);
-  // A grid of our size that the search for our board refused is a part of it beside something else.
+  // A grid of the requested size that the search for it refused: a part of the board, and something
+  // beside it.
   if (seen == inner) {
     found.reason = Reason::kPartialBoard;
     return;

@@ -17,8 +17,8 @@ struct MapView {
   bool is_measured = false;
 };
 
-// Of a segment of the map. Ahead is where its first keyframe looks, or along the world's x axis
-// where its z axis points down.
+// The view of a segment of the map. Ahead is where its first keyframe looks, or, where the world's
+// z axis points down, along its x axis.
 MapView view_of(const Flight& flight, const std::vector<FlightKeyframe>& keyframes,
                 int32_t segment);
 

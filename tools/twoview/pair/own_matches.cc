@@ -11,7 +11,7 @@ namespace cli {
 namespace {
 
 constexpr double kMostNormalised = 2;  // beyond this a coordinate is a pixel, and no ray's slope
-constexpr size_t kTelling = 20;        // matches, of which all would lie in one corner by chance
+constexpr size_t kTelling = 20;        // fewer matches may all lie in one corner by chance
 
 std::string size_in_words(cv::Size size) {
   return std::to_string(size.width) + "x" + std::to_string(size.height);

@@ -21,7 +21,7 @@ struct OwnMatchOptions {
 
   bool given() const { return !path.empty(); }
   // Adds --matches and --matches-resize, which exclude the options of corners, of descriptors and
-  // of their matching: call it after add_common. type: of the path.
+  // of their matching: call it after add_common. type: what --help calls the path.
   void add_to(CLI::App& verb, const std::string& help, const std::string& type);
   // Adds both to the options of a result.
   void add_json(nlohmann::ordered_json& options) const;
