@@ -7,6 +7,7 @@
   found in some source file.
 - The word after `twoview` is a verb of the program, and an option after it is an option of that
   verb.
+- A decision that a comment names is a page of docs/decisions.
 - A page on an algorithm has its six parts: problem, formula, where it is valid, paper, file, test,
   under headings, with formulas as blocks of math.
 """
@@ -88,6 +89,22 @@ class TestPages(unittest.TestCase):
                     wrong += [f"{page}:{line}: {one}" for one in braces(path)
                               if one not in self.tests and not exists(one)]
         self.report(sorted(set(wrong)), "paths that name no file")
+
+    def test_every_decision_that_a_comment_names_is_a_page(self):
+        wrong, count = [], 0
+        for folder in ("lib", "drivers", "tools", "python", "test", "scripts"):
+            for path in sorted((ROOT / folder).rglob("*")):
+                # the frozen headers of a release name the decisions of their time
+                if not path.is_file() or "abi" in path.parts or path.suffix not in (
+                        ".c", ".cc", ".h", ".py", ".txt", ""):
+                    continue
+                for name in re.findall(r"docs/decisions/([\w-]+(?:\.md)?)",
+                                       path.read_text(errors="replace")):
+                    count += 1
+                    if not (ROOT / "docs" / "decisions" / name).is_file():
+                        wrong.append(f"{path.relative_to(ROOT)}: docs/decisions/{name}")
+        self.assertGreater(count, 20)
+        self.report(wrong, "decisions that are no page")
 
     def test_every_test_of_the_contract_is_known(self):
         if not self.tests:
