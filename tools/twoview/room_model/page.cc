@@ -161,9 +161,9 @@ RoomSection room_section(const RoomScene& scene, const RoomModel& model) {
       "that one looks in from outside. The path is yellow." +
       coarser + "</p>\n<h2>From above</h2>\n<figure class=\"plan\">" +
       plan_svg(plan, scene, model) +
-      "<figcaption>Dark lines are walls, thinner ones other upright planes, grey whatever else "
-      "stands upright; the light area was looked across; the path is "
-      "blue.</figcaption></figure>\n" +
+      "<figcaption>Dark lines are walls, dashed where something hides them or no corner was "
+      "measured, thinner ones fronts of furniture, grey whatever else stands upright; the light "
+      "area was looked across; the path is blue.</figcaption></figure>\n" +
       missing_section(model) + truth_section(model) + "</section>\n";
   section.script = "<script type=\"application/json\" id=\"room-data\">" +
                    surface_json(scene, model).dump() + "</script>\n<script>\n" + kGesturesScript +

@@ -30,55 +30,6 @@ cv::Point2d from_above(const Matrix3& axes, const Vector3& point) {
   return {at[0], at[1]};
 }
 
-// The stretches of a line along which enough of a plane was measured. `along`: where on the line
-// each vertex of the plane lies.
-std::vector<std::pair<double, double>> stretches(std::vector<double> along, double voxel) {
-  const double gap = 10 * voxel, shortest = 8 * voxel;  // 30 and 24 cm at 3 cm
-  constexpr double kVerticesOfCell = 6;                 // one above the other: 18 cm at 3 cm
-  std::sort(along.begin(), along.end());
-  std::vector<std::pair<double, double>> found;
-  for (size_t begin = 0; begin < along.size();) {
-    size_t end = begin + 1;
-    while (end < along.size() && along[end] - along[end - 1] < gap) ++end;
-    const double length = along[end - 1] - along[begin];
-    if (length > shortest && static_cast<double>(end - begin) > kVerticesOfCell * length / voxel)
-      found.emplace_back(along[begin], along[end - 1]);
-    begin = end;
-  }
-  return found;
-}
-
-void add_lines(const RoomModel& model, RoomPlan& plan) {
-  constexpr double kWallBehind = 0.03;  // as for tv_room_infer
-  constexpr double kSameNormal = 0.9;   // cosine of 26 degrees
-  for (const tv_room_plane& plane : model.planes) {
-    if (plane.kind != TV_ROOM_PLANE_UPRIGHT) continue;
-    const Vector3 normal{plane.normal[0], plane.normal[1], plane.normal[2]};
-    Vector3 along = cross(model.up, normal);
-    const double length = norm(along);
-    if (!(length > 0)) continue;
-    for (double& value : along) value /= length;
-    std::vector<double> places;
-    for (const tv_room_vertex& v : model.vertices) {
-      const Vector3 at = position_of(v);
-      if (std::abs(dot(normal, at) - plane.offset) < 2 * model.voxel &&
-          dot(normal, normal_of(v)) > kSameNormal)
-        places.push_back(dot(along, at));
-    }
-    const Vector3 centre{plane.centre[0], plane.centre[1], plane.centre[2]};
-    const double middle = dot(along, centre);
-    for (const auto& [low, high] : stretches(std::move(places), model.voxel)) {
-      Vector3 a = centre, b = centre;
-      for (size_t k = 0; k < 3; ++k) {
-        a[k] += (low - middle) * along[k];
-        b[k] += (high - middle) * along[k];
-      }
-      plan.lines.push_back(
-          {from_above(model.axes, a), from_above(model.axes, b), plane.share_behind < kWallBehind});
-    }
-  }
-}
-
 // 255 in each cell from which a wall is met in three of the four directions along the axes.
 cv::Mat between_walls(const RoomModel& model, const RoomPlan& plan) {
   cv::Mat walls = cv::Mat::zeros(model.free_cells.size(), CV_8U);
@@ -104,8 +55,26 @@ cv::Mat between_walls(const RoomModel& model, const RoomPlan& plan) {
   return met >= 3;
 }
 
+// Clears the cells behind walls, where there is no room: errors of depth reach there.
+void clear_behind_walls(const RoomModel& model, const RoomPlan& plan, cv::Mat& cells) {
+  for (const PlanLine& line : plan.lines) {
+    if (!line.is_wall) continue;
+    const cv::Point2d along = line.along(), normal = line.normal();
+    const double length = cv::norm(line.b - line.a);
+    for (int y = 0; y < cells.rows; ++y) {
+      for (int x = 0; x < cells.cols; ++x) {
+        const cv::Point2d from_a =
+            model.free_origin + model.free_cell * cv::Point2d(x + 0.5, y + 0.5) - line.a;
+        const double place = along.dot(from_a);
+        if (place > 0 && place < length && normal.dot(from_a) < 0) cells.at<uint8_t>(y, x) = 0;
+      }
+    }
+  }
+}
+
 void add_floor(const RoomModel& model, RoomPlan& plan) {
-  const cv::Mat cells = model.free_cells | between_walls(model, plan);
+  cv::Mat cells = model.free_cells | between_walls(model, plan);
+  clear_behind_walls(model, plan, cells);
   std::vector<std::vector<cv::Point>> outlines;
   cv::findContours(cells.clone(), outlines, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_SIMPLE);
   double most = 0;
@@ -178,6 +147,21 @@ std::string short_number(double value) {
   return text;
 }
 
+// A line from one pixel to another; of dashes where it was carried.
+void add_line(const PlanLine& line, const cv::Point2d& from, const cv::Point2d& to,
+              Drawing& sheet) {
+  constexpr double kDash = 12;  // pixels, with what follows
+  const int dashes = line.is_carried ? static_cast<int>(cv::norm(to - from) / kDash) + 1 : 1;
+  const double drawn = line.is_carried ? 0.5 : 1;
+  for (int k = 0; k < dashes; ++k)
+    sheet.shapes.push_back({Shape::kLine,
+                            {from + (k / static_cast<double>(dashes)) * (to - from),
+                             from + ((k + drawn) / dashes) * (to - from)},
+                            line.is_wall ? 5.0 : 2.5,
+                            line.is_wall ? kWall : kOther,
+                            ""});
+}
+
 Drawing drawing_of(const RoomPlan& plan, const RoomScene& scene, const RoomModel& model) {
   constexpr double kSide = 820, kMargin = 40, kFoot = 70;  // pixels
   double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
@@ -217,12 +201,7 @@ Drawing drawing_of(const RoomPlan& plan, const RoomScene& scene, const RoomModel
                               kUpright,
                               ""});
   sheet.shapes.push_back({Shape::kLine, all_at(plan.path), 1.2, kPath, ""});
-  for (const PlanLine& line : plan.lines)
-    sheet.shapes.push_back({Shape::kLine,
-                            {at(line.a), at(line.b)},
-                            line.is_wall ? 5.0 : 2.5,
-                            line.is_wall ? kWall : kOther,
-                            ""});
+  for (const PlanLine& line : plan.lines) add_line(line, at(line.a), at(line.b), sheet);
   const std::string unit = scene.is_metric ? " m" : "";
   const double bar = round_below(0.25 * sheet.width / scale);
   const double y = sheet.height - 34, x = kMargin;
@@ -303,7 +282,7 @@ cv::Mat FreeArea::cells() const {
 
 RoomPlan plan_of(const RoomScene& scene, const RoomModel& model) {
   RoomPlan plan;
-  add_lines(model, plan);
+  plan.lines = plan_lines(model);
   add_floor(model, plan);
   add_upright(model, plan);
   for (const RoomView& view : scene.views) plan.path.push_back(from_above(model.axes, view.t));

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "room_model/plan_lines.h"
 #include "room_model/scene.h"
 
 namespace cli {
@@ -33,11 +34,6 @@ class FreeArea {
   cv::Point2d origin_;
   cv::Mat counts_;
   std::vector<int64_t> surface_;  // sorted keys of where the model has a surface
-};
-
-struct PlanLine {
-  cv::Point2d a, b;      // in room axes
-  bool is_wall = false;  // of the room; else a cupboard, a door that stands open, a screen
 };
 
 struct RoomPlan {

@@ -31,6 +31,24 @@ Json shares_json(const PixelCounts& p) {
 const char* const kDirectionKeys[kNumDirections] = {"plan_right",  "plan_left", "plan_top",
                                                     "plan_bottom", "up",        "down"};
 
+// A point of the room's axes in the world.
+Vector3 in_world(const RoomModel& model, const cv::Point2d& from_above, double height) {
+  return applied(transposed(model.axes), {from_above.x, from_above.y, height});
+}
+
+Json walls_json(const RoomModel& model, const RoomPlan& plan) {
+  Json walls = Json::array();
+  for (const PlanLine& line : plan.lines)
+    walls.push_back({{"from", in_world(model, line.a, line.low)},
+                     {"to", in_world(model, line.b, line.low)},
+                     {"height", line.high - line.low},
+                     {"normal", in_world(model, line.normal(), 0)},
+                     {"sigma", line.sigma},
+                     {"is_wall", line.is_wall},
+                     {"is_carried", line.is_carried}});
+  return walls;
+}
+
 std::string short_unit(const RoomScene& scene) { return scene.is_metric ? " m" : ""; }
 
 }  // namespace
@@ -54,7 +72,9 @@ Json room_json(const RoomScene& scene, const RoomModel& model) {
   json["voxel"] = model.voxel;
   json["first_voxel"] = model.first_voxel;
   json["size"] = model.size;
-  json["floor_area"] = model.triangles.empty() ? 0.0 : plan_of(scene, model).area;
+  const RoomPlan plan = model.triangles.empty() ? RoomPlan{} : plan_of(scene, model);
+  json["floor_area"] = plan.area;
+  json["walls"] = walls_json(model, plan);
   json["unit"] = scene.is_metric ? "metric" : "unit";
   json["up"] = model.up;
   json["up_source"] = model.up_source;

@@ -12,7 +12,7 @@ import numpy as np
 
 from .. import ROOT
 from ..odometry import flights, poses, sets, surfaces
-from . import flight, model, peer, tape, truth
+from . import flight, model, peer, plan, tape, truth
 
 FLIGHT_FOLDER = os.path.join(ROOT, ".cache", "flights")
 PROGRAM = os.path.join(ROOT, "build", "release", "bin", "twoview")
@@ -34,6 +34,9 @@ def arguments_of(argv):
                         " of the same keyframes, partners and poses; some 10 s a keyframe")
     parser.add_argument("--tape", action="store_true",
                         help="lengths between marks on the surface as well, beside the true ones")
+    parser.add_argument("--plan", action="store_true",
+                        help="the lines of the plan that `twoview room` draws as well, beside the "
+                        "upright sides of the true room")
     return parser.parse_args(argv)
 
 
@@ -61,6 +64,13 @@ def measure(folder, out, arguments):
                 "ms_depth": one.ms_depth, "ms_fusion": one.ms_fusion, "ms_mesh": one.ms_mesh}
 
     row = row_of(made)
+    if arguments.plan:
+        with tempfile.TemporaryDirectory() as room:
+            result = plan.make(PROGRAM, out, os.path.join(room, "room"))
+        row["plan"] = plan.scores(
+            result, boxes, lambda points: truth.seen_twice(
+                boxes, points, source.camera, R @ source.R[keys],
+                scale * source.centres[keys] @ R.T + t), (scale, R, t))
     if arguments.tape:
         row["tape"] = taped(folder, out, arguments, source, made, boxes, samples[seen], scale)
     if arguments.peers:
@@ -124,6 +134,8 @@ def main(argv=None):
         print(line_of(f"{seed:02d}", row), flush=True)
         if arguments.peers:
             print(line_of("  peer", row["peer"]), flush=True)
+        if arguments.plan:
+            print(plan.line_of(f"   plan {seed:02d}", row["plan"]), flush=True)
         if arguments.tape:
             print(tape_line_of(f"   tape {seed:02d}", row["tape"]), flush=True)
     if rows:
