@@ -12,7 +12,9 @@ import signal
 import struct
 import subprocess
 import tempfile
+import time
 import unittest
+import urllib.request
 from pathlib import Path
 
 import numpy as np
@@ -330,6 +332,55 @@ class RoomTest(CliTest):
         self.assertIsNone(self.result(both)["room"])
         self.one_line(self.run_program("odometry", self.source, "-o", both, "--voxel", "0.1"),
                       "--room")
+
+    def test_the_live_page_shows_the_surface_as_it_grows_and_ctrl_c_keeps_it(self):
+        long, order = self.folder / "long", [*range(COUNT), *range(COUNT - 2, 0, -1)] * 400
+        shutil.copytree(self.source, long)
+        (long / "frames.txt").write_text("".join(
+            f"{k / 25:.9f} images/{i:05}.png\n" for k, i in enumerate(order)))
+        child = subprocess.Popen(
+            [program(), "odometry", long, "-o", self.out, "--live", "--room", "--no-pictures"],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(child.communicate)
+        self.addCleanup(child.kill)
+        address = re.search(r"http://[\d.:]+/", child.stdout.readline())
+        if not address:
+            self.skipTest(child.stderr.read().strip())
+
+        def fetched(name):
+            with urllib.request.urlopen(address.group() + name, timeout=20) as reply:
+                return reply.read()
+
+        data, end = {}, time.monotonic() + 60
+        while (data.get("surface") or {}).get("num_keyframes", 0) < 2:
+            self.assertLess(time.monotonic(), end, "no surface grows")
+            data = json.loads(fetched("data.json"))
+            time.sleep(0.05)
+        bytes_ = fetched("surface.bin")
+        path = np.reshape(data["path"], (-1, 3))
+        if CHROMIUM:
+            shown = subprocess.run(
+                [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--dump-dom",
+                 "--virtual-time-budget=3000", f"--user-data-dir={self.folder}/profile",
+                 address.group()], capture_output=True, timeout=120).stdout.decode()
+            self.assertGreater(int(re.search(r'data-triangles="(\d+)"', shown).group(1)), 500)
+        child.send_signal(signal.SIGINT)
+        self.assertEqual(child.wait(timeout=60), 0)
+        num_vertices, num_triangles = np.frombuffer(bytes_, np.uint32, 2)
+        self.assertEqual(len(bytes_), 8 + 15 * num_vertices + 12 * num_triangles)
+        vertices = np.frombuffer(bytes_, np.float32, 3 * num_vertices, 8).reshape(-1, 3)
+        corners = np.frombuffer(bytes_, np.uint32, 3 * num_triangles, 8 + 12 * num_vertices)
+        self.assertGreater(num_triangles, 500)
+        self.assertLess(corners.max(), num_vertices)
+        # The flown path is as long as the true one; its first frame is the world.
+        scale = STEP * (COUNT - 1) / np.ptp(path[:, 0])
+        off = away_from_walls(scale * (vertices - path[0]))
+        self.assertLess(np.median(off), 0.02 * np.median(DEPTHS))
+        # The flight ended with the signal, and the room is of what was flown until then.
+        result = self.result()
+        self.assertTrue(result["interrupted"])
+        self.assertLess(result["num_frames"], len(order))
+        self.assertGreater(result["room"]["num_triangles"], 1000)
 
     def test_up_is_where_attitudes_say_it_that_begin_after_the_film(self):
         """The map begins without an attitude, so its z axis is the camera's, not down."""

@@ -228,6 +228,8 @@ const std::atomic<bool>& stop_flag_for_signals() {
   return stop_flag();
 }
 
+void clear_stop_flag() { stop_flag() = false; }
+
 void clean_up_on_signals() {
   sigset_t awaited;
   sigemptyset(&awaited);

@@ -73,6 +73,8 @@ void clean_up_on_signals();
 // For work that must end properly on a signal (a recording, a simulation). After this call the
 // first such signal only sets the returned flag, and a second one ends the program.
 const std::atomic<bool>& stop_flag_for_signals();
+// Clears the flag, for the next part of the work, which the next signal shall end properly as well.
+void clear_stop_flag();
 
 // Sets what is called when a signal ends the program, such as to give the terminal its mode back;
 // null: nothing.

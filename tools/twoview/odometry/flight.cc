@@ -167,6 +167,7 @@ void Flight::track(const std::atomic<bool>& stop, const std::function<void()>& a
     if (source_.wants_found() && given_.size() > num_given) tell_source();
     if (after_frame) after_frame();
     picture_.release();
+    colour_.release();
     const int next = frame.index / options_.every + 1;
     return options_.max_frames == 0 || next < options_.max_frames;
   };
@@ -251,6 +252,7 @@ void Flight::track_frame(SourceFrame frame) {
     record.reference_from_cam = pose_of(state_.reference_from_cam_R, state_.reference_from_cam_t);
   }
   picture_ = frame.luma;
+  colour_ = frame.colour;
   if (record.is_keyframe && options_.keeps_pictures)
     thumbnails_[static_cast<int>(given_.size())] = thumbnail_of(frame.luma);
   if (record.is_keyframe) keep_colours(frame);
@@ -407,6 +409,37 @@ bool Flight::ended_tracked() const {
 std::vector<FlightKeyframe> Flight::keyframes() const {
   return odometry_ ? keyframes_of(odometry_, options_.odometry.max_keypoints)
                    : std::vector<FlightKeyframe>();
+}
+
+std::vector<FlightKeyframe> Flight::keyframe_poses() const {
+  std::vector<FlightKeyframe> keyframes;
+  if (!odometry_) return keyframes;
+  FlightKeyframe key;
+  tv_keyframe_init(&key.keyframe);
+  for (int32_t idx = 0; tv_odometry_keyframe(odometry_, idx, &key.keyframe) == TV_OK; ++idx)
+    keyframes.push_back(key);
+  return keyframes;
+}
+
+std::vector<std::pair<tv_map_observation, Rgb>> Flight::coloured(int32_t idx) const {
+  std::vector<std::pair<tv_map_observation, Rgb>> found;
+  tv_keyframe key;
+  tv_keyframe_init(&key);
+  check(tv_odometry_keyframe(odometry_, idx, &key), "keyframe " + std::to_string(idx));
+  const auto kept = colours_.find(key.frame);
+  if (kept == colours_.end()) return found;
+  std::vector<tv_map_observation> seen(static_cast<size_t>(options_.odometry.max_keypoints));
+  int32_t count = 0;
+  check(tv_odometry_observations(odometry_, idx, seen.data(), options_.odometry.max_keypoints,
+                                 &count),
+        "keyframe " + std::to_string(idx));
+  seen.resize(static_cast<size_t>(count));
+  for (const tv_map_observation& one : seen) {
+    const auto keypoint = static_cast<size_t>(one.idx_keypoint);
+    if (one.idx_point >= 0 && keypoint < kept->second.size())
+      found.emplace_back(one, kept->second[keypoint]);
+  }
+  return found;
 }
 
 std::vector<tv_map_point> Flight::points() const {

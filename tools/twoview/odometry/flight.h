@@ -116,6 +116,10 @@ class Flight {
   // The picture of the last frame, as it was tracked; only within `after_frame` of track(), and
   // empty for a frame that could not be used.
   const cv::Mat& picture() const { return picture_; }
+  // Its colours, BGR, of the size of the source's frames, and its mask, of the size of picture();
+  // both may be empty. Likewise only within `after_frame`.
+  const cv::Mat& colour() const { return colour_; }
+  const cv::Mat& mask() const { return mask_; }
   // The direction down in a segment of the map by the attitudes of its frames; null where none was
   // given. It is the z axis where the segment began with an attitude.
   std::optional<Vector3> down(int32_t segment) const;
@@ -150,7 +154,12 @@ class Flight {
 
   // The map as it is. The index of a point in points() is that of the observations.
   std::vector<FlightKeyframe> keyframes() const;
+  // Without what they see.
+  std::vector<FlightKeyframe> keyframe_poses() const;
   std::vector<tv_map_point> points() const;
+  // What the keyframe number idx of the map sees, whose colours are kept, with these: only points.
+  // Empty where the picture had none.
+  std::vector<std::pair<tv_map_observation, Rgb>> coloured(int32_t idx) const;
   // For each of these points of the map the colour of its pixel in the newest of these keyframes
   // that sees it and whose picture had colours; else its grey level.
   std::vector<Rgb> colours(const std::vector<tv_map_point>& points,
@@ -185,7 +194,7 @@ class Flight {
   tv_odometry_state state_;
   std::optional<tv_odometry_state> told_;  // the last one that was passed to the source
   std::vector<FlightFrame> frames_;
-  cv::Mat picture_;
+  cv::Mat picture_, colour_;  // of the frame
   cv::Mat still_mask_;
   double masked_ = 0;                    // sum of the shares that masks have left out
   std::vector<size_t> given_;            // indices of frames_

@@ -3,24 +3,35 @@
 #include <arpa/inet.h>
 #include <microhttpd.h>
 #include <netinet/in.h>
+#include <time.h>
 
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <cmath>
+#include <condition_variable>
 #include <cstring>
 #include <deque>
 #include <map>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <optional>
 #include <set>
+#include <thread>
+#ifdef __linux__
+#include <sys/resource.h>
+#endif
 
 #include "base/error.h"
 #include "odometry/assets.h"
 #include "odometry/outputs.h"
 #include "odometry/view.h"
 #include "pair/session.h"
+#include "report/assets.h"
+#ifdef TWOVIEW_HAS_ROOM
+#include "odometry/live_room.h"
+#endif
 
 namespace cli {
 namespace {
@@ -32,6 +43,23 @@ constexpr uint64_t kWatchedNs = 3000000000;  // after a request somebody still l
 constexpr size_t kMaxPoints = 6000, kMaxPath = 3000;
 constexpr size_t kTrackLength = 8;  // frames of a track, the newest included
 constexpr unsigned kMaxConnections = 16, kTimeoutS = 10;
+constexpr double kShare = 0.02;  // of the tracking thread's CPU time, the most that update() takes
+constexpr int kMostColoured = 8;  // keyframes whose colours are looked up in one update
+constexpr auto kSurfacePeriod = std::chrono::milliseconds(300);  // between two surfaces
+
+// CPU time of this thread, in milliseconds.
+double cpu_ms() {
+  timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return 1e3 * static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_nsec);
+}
+
+// Where both threads want the same core, this one gets 3.4 % of it.
+void lower_priority_of_this_thread() {
+#ifdef __linux__
+  setpriority(PRIO_PROCESS, 0, 15);
+#endif
+}
 
 double rounded(double value) { return std::round(value * 1e4) / 1e4; }
 
@@ -61,18 +89,58 @@ int32_t newest_segment(const Flight& flight) {
   return -1;
 }
 
+// What one update copies.
+struct Snapshot {
+  tv_odometry_state state{};
+  std::string reasons;
+  double time_s = 0, time_ms = 0;
+  size_t num_frames = 0;
+  cv::Mat picture;
+  std::vector<tv_map_observation> seen;  // by the last frame
+  std::vector<tv_map_point> points;
+  std::map<int32_t, Rgb> colours;  // that are new, by the ids of points
+  int32_t segment = -1;
+  std::vector<Vector3> path;
+  Matrix3 view{};
+};
+
 }  // namespace
 
 struct LivePage::State {
   MHD_Daemon* daemon = nullptr;
   std::atomic<uint16_t> port{0};
   std::atomic<uint64_t> asked_ns{0};
-  // What the page fetches. Hold the mutex while reading or writing it.
+  std::thread worker;
+
+  // Between the threads. Hold the mutex while reading or writing it.
   std::mutex mutex;
-  std::string data = "{\"status\":\"waiting\"}", picture;
+  std::condition_variable wakes;
+  bool stops = false;
+  std::optional<Snapshot> copied;                        // to be written
+  std::string data = "\"status\":\"waiting\"", picture;  // what the page fetches
+  std::string stage;
+  std::shared_ptr<const std::string> surface;
+  uint64_t surface_version = 0;
+  size_t surface_keyframes = 0;
+  bool has_final_surface = false;
+#ifdef TWOVIEW_HAS_ROOM
+  std::optional<LiveRoom::Job> job;  // to be fused
+#endif
+
   // Of the thread that tracks.
   uint64_t updated_ns = 0;
+  double watched_since_ms = -1, spent_ms = 0;  // of its CPU time
+  std::set<int32_t> coloured;                  // ids of keyframes
+  size_t viewed_keyframes = 0;
+  int32_t viewed_segment = -1;
+  Matrix3 view{};
+#ifdef TWOVIEW_HAS_ROOM
+  std::optional<LiveRoom> room;
+#endif
+
+  // Of the thread that writes.
   std::deque<Sightings> sightings;  // the newest first
+  std::map<int32_t, Rgb> colours;   // by the ids of points
 
   static MHD_Result answer(void* self, MHD_Connection* connection, const char* url,
                            const char* method, const char* version, const char* upload,
@@ -80,8 +148,13 @@ struct LivePage::State {
   MHD_Result respond(MHD_Connection* connection, const std::string& path);
   // Whether the request names this server, and not a name that some page made point to it.
   bool is_own(MHD_Connection* connection) const;
+  std::string data_text();  // with the mutex held
 
-  Json tracks(const Flight& flight, const std::vector<tv_map_point>& points);
+  void copy(const Flight& flight);
+  Snapshot snapshot_of(const Flight& flight);
+  void work();
+  Json tracks(const Snapshot& snapshot);
+  std::string text_of(const Snapshot& snapshot);
 };
 
 bool LivePage::State::is_own(MHD_Connection* connection) const {
@@ -90,7 +163,20 @@ bool LivePage::State::is_own(MHD_Connection* connection) const {
   return host != nullptr && (host == "127.0.0.1" + suffix || host == "localhost" + suffix);
 }
 
+// The flight's data change less often than the surface and the stage.
+std::string LivePage::State::data_text() {
+  Json json;
+  json["stage"] = stage;
+  json["surface"] = nullptr;
+  if (surface)
+    json["surface"] = {{"version", surface_version}, {"num_keyframes", surface_keyframes}};
+  std::string text = json.dump();
+  text.back() = ',';
+  return text + data + "}";
+}
+
 MHD_Result LivePage::State::respond(MHD_Connection* connection, const std::string& path) {
+  std::shared_ptr<const std::string> shared;
   std::string body, type = "text/plain; charset=utf-8";
   unsigned status = MHD_HTTP_OK;
   if (!is_own(connection)) {
@@ -99,19 +185,28 @@ MHD_Result LivePage::State::respond(MHD_Connection* connection, const std::strin
   } else if (path == "/") {
     type = "text/html; charset=utf-8";
     body = kLivePage;
+  } else if (path == "/surface.js") {
+    type = "text/javascript; charset=utf-8";
+    body = kSurfaceScript;
   } else if (path == "/data.json" || path == "/picture.jpg") {
     asked_ns = now_ns();
     const std::lock_guard<std::mutex> lock(mutex);
     const bool is_data = path == "/data.json";
     type = is_data ? "application/json" : "image/jpeg";
-    body = is_data ? data : picture;
+    body = is_data ? data_text() : picture;
     if (body.empty()) status = MHD_HTTP_NOT_FOUND;
+  } else if (path == "/surface.bin") {
+    type = "application/octet-stream";
+    const std::lock_guard<std::mutex> lock(mutex);
+    shared = surface;
+    if (!shared) status = MHD_HTTP_NOT_FOUND;
   } else {
     status = MHD_HTTP_NOT_FOUND;
     body = "there is no such page\n";
   }
-  MHD_Response* response =
-      MHD_create_response_from_buffer(body.size(), body.data(), MHD_RESPMEM_MUST_COPY);
+  const std::string& bytes = shared ? *shared : body;
+  MHD_Response* response = MHD_create_response_from_buffer(
+      bytes.size(), const_cast<char*>(bytes.data()), MHD_RESPMEM_MUST_COPY);
   if (response == nullptr) return MHD_NO;
   MHD_add_response_header(response, "Content-Type", type.c_str());
   MHD_add_response_header(response, "Cache-Control", "no-store");
@@ -132,7 +227,7 @@ MHD_Result LivePage::State::answer(void* self, MHD_Connection* connection, const
   }
 }
 
-LivePage::LivePage(int port) : state_(std::make_unique<State>()) {
+LivePage::LivePage(int port, bool shows_room) : state_(std::make_unique<State>()) {
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_port = htons(static_cast<uint16_t>(port));
@@ -147,9 +242,21 @@ LivePage::LivePage(int port) : state_(std::make_unique<State>()) {
                    (errno != 0 ? std::strerror(errno) : "unknown error"));
   const MHD_DaemonInfo* info = MHD_get_daemon_info(state_->daemon, MHD_DAEMON_INFO_BIND_PORT);
   state_->port = info != nullptr ? info->port : static_cast<uint16_t>(port);
+#ifdef TWOVIEW_HAS_ROOM
+  if (shows_room) state_->room.emplace();
+#else
+  (void)shows_room;
+#endif
+  state_->worker = std::thread([this] { state_->work(); });
 }
 
 LivePage::~LivePage() {
+  {
+    const std::lock_guard<std::mutex> lock(state_->mutex);
+    state_->stops = true;
+  }
+  state_->wakes.notify_all();
+  if (state_->worker.joinable()) state_->worker.join();
   if (state_->daemon != nullptr) MHD_stop_daemon(state_->daemon);
 }
 
@@ -157,19 +264,173 @@ std::string LivePage::address() const {
   return "http://127.0.0.1:" + std::to_string(state_->port.load()) + "/";
 }
 
-Json LivePage::State::tracks(const Flight& flight, const std::vector<tv_map_point>& points) {
-  std::vector<tv_map_observation> seen(4096);
-  int32_t count = 0;
-  Json tracks = Json::array();
-  if (tv_odometry_last_frame(flight.odometry(), seen.data(), static_cast<int32_t>(seen.size()),
-                             &count) != TV_OK)
-    return tracks;
-  Sightings own;
-  for (int32_t k = 0; k < count; ++k) {
-    const tv_map_observation& at = seen[static_cast<size_t>(k)];
-    if (at.idx_point >= 0 && static_cast<size_t>(at.idx_point) < points.size())
-      own[points[static_cast<size_t>(at.idx_point)].id] = {at.x, at.y};
+void LivePage::tell(const std::string& stage) {
+  const std::lock_guard<std::mutex> lock(state_->mutex);
+  state_->stage = stage;
+}
+
+void LivePage::show(std::string surface, size_t num_keyframes) {
+  const std::lock_guard<std::mutex> lock(state_->mutex);
+  state_->has_final_surface = true;
+  state_->surface = std::make_shared<const std::string>(std::move(surface));
+  state_->surface_keyframes = num_keyframes;
+  ++state_->surface_version;
+}
+
+// -- the thread that tracks ---------------------------------------------------------------------
+
+void LivePage::update(const Flight& flight) {
+  State& s = *state_;
+  const uint64_t now = now_ns(), asked = s.asked_ns;
+  if (asked == 0 || now - asked > kWatchedNs) {
+    s.watched_since_ms = -1;
+#ifdef TWOVIEW_HAS_ROOM
+    if (s.room) s.room->forget_pictures();
+#endif
+    return;
   }
+  if (flight.odometry() == nullptr || flight.picture().empty()) return;
+  const double began_ms = cpu_ms();
+  if (s.watched_since_ms < 0) {
+    s.watched_since_ms = began_ms;
+    s.spent_ms = 0;
+  }
+  if (s.spent_ms > kShare * (began_ms - s.watched_since_ms)) return;
+  s.copy(flight);
+  s.spent_ms += cpu_ms() - began_ms;
+}
+
+// Gives the other thread what it has room for. It holds the mutex for moments only, but may be
+// interrupted then for long, which the tracking does not wait for.
+void LivePage::State::copy(const Flight& flight) {
+#ifdef TWOVIEW_HAS_ROOM
+  if (room && room->keep(flight)) {
+    std::unique_lock<std::mutex> lock(mutex, std::try_to_lock);
+    if (lock.owns_lock() && !job) {
+      job = room->next(flight);
+      if (job) wakes.notify_one();
+    }
+  }
+#endif
+  const uint64_t now = now_ns();
+  if (now - updated_ns < kPeriodNs) return;
+  updated_ns = now;
+  Snapshot made = snapshot_of(flight);
+  const std::unique_lock<std::mutex> lock(mutex, std::try_to_lock);
+  if (!lock.owns_lock()) return;
+  // Colours are told once, so those of a snapshot that was not written go on.
+  if (copied) made.colours.merge(copied->colours);
+  copied = std::move(made);
+  wakes.notify_one();
+}
+
+Snapshot LivePage::State::snapshot_of(const Flight& flight) {
+  Snapshot made;
+  const std::vector<FlightFrame>& frames = flight.frames();
+  made.state = flight.state();
+  made.reasons = reasons_text(frames.back());
+  made.time_s = frames.back().time_s - frames.front().time_s;
+  made.time_ms = frames.back().time_ms;
+  made.num_frames = frames.size();
+  made.picture = flight.picture().clone();
+  made.seen.resize(4096);
+  int32_t count = 0;
+  if (tv_odometry_last_frame(flight.odometry(), made.seen.data(),
+                             static_cast<int32_t>(made.seen.size()), &count) != TV_OK)
+    count = 0;
+  made.seen.resize(static_cast<size_t>(count));
+  made.points = flight.points();
+  const std::vector<FlightKeyframe> keyframes = flight.keyframe_poses();
+  int num_coloured = 0;
+  for (size_t k = keyframes.size(); k > 0 && num_coloured < kMostColoured; --k) {
+    if (!coloured.insert(keyframes[k - 1].keyframe.id).second) continue;
+    ++num_coloured;
+    for (const auto& [seen, rgb] : flight.coloured(static_cast<int32_t>(k - 1)))
+      made.colours.emplace(made.points[static_cast<size_t>(seen.idx_point)].id, rgb);
+  }
+  made.segment = newest_segment(flight);
+  // Which way is up changes little with each keyframe more.
+  if (made.segment != viewed_segment || keyframes.size() > viewed_keyframes + viewed_keyframes / 8) {
+    viewed_segment = made.segment;
+    viewed_keyframes = keyframes.size();
+    view = view_of(flight, keyframes, made.segment).view_from_world;
+  }
+  made.view = view;
+  const size_t step = frames.size() / kMaxPath + 1;
+  for (size_t k = (frames.size() - 1) % step; k < frames.size(); k += step) {
+    Vector3 t{};
+    int32_t own = -1;
+    if (position_of(flight, frames[k], t.data(), &own) && own == made.segment)
+      made.path.push_back(t);
+  }
+  return made;
+}
+
+// -- the thread that writes ---------------------------------------------------------------------
+
+void LivePage::State::work() {
+  lower_priority_of_this_thread();
+  std::unique_lock<std::mutex> lock(mutex);
+#ifdef TWOVIEW_HAS_ROOM
+  RoomPreview preview;
+  bool is_unsettled = false, has_grown = false, is_whole = true;
+  auto written = std::chrono::steady_clock::now();
+  const auto has_work = [&] { return stops || copied || job || is_unsettled; };
+#else
+  const auto has_work = [&] { return stops || copied; };
+#endif
+  while (!stops) {
+    if (std::optional<Snapshot> taken; copied) {
+      taken.swap(copied);
+      lock.unlock();
+      std::string text = text_of(*taken);
+      std::vector<uint8_t> jpeg;
+      cv::imencode(".jpg", taken->picture, jpeg, {cv::IMWRITE_JPEG_QUALITY, 80});
+      lock.lock();
+      data.swap(text);
+      picture.assign(jpeg.begin(), jpeg.end());
+    }
+#ifdef TWOVIEW_HAS_ROOM
+    if (std::optional<LiveRoom::Job> taken; job || is_unsettled) {
+      taken.swap(job);
+      lock.unlock();
+      try {
+        if (taken && is_whole) preview.add(taken->key, taken->places);
+        is_unsettled = is_whole && preview.settle();
+        has_grown = is_whole;
+      } catch (const BadInput&) {
+        is_whole = is_unsettled = false;  // what there is stays
+      }
+      lock.lock();
+    }
+    const auto now = std::chrono::steady_clock::now();
+    if (has_grown && now - written > kSurfacePeriod) {
+      lock.unlock();
+      auto bytes = std::make_shared<const std::string>(preview.surface());
+      has_grown = false;
+      written = now;
+      lock.lock();
+      if (!bytes->empty() && !has_final_surface) {
+        surface = bytes;
+        surface_keyframes = preview.num_keyframes();
+        ++surface_version;
+      }
+    }
+    if (has_grown) {
+      wakes.wait_for(lock, kSurfacePeriod, has_work);
+      continue;
+    }
+#endif
+    wakes.wait(lock, has_work);
+  }
+}
+
+Json LivePage::State::tracks(const Snapshot& snapshot) {
+  Json tracks = Json::array();
+  Sightings own;
+  for (const tv_map_observation& at : snapshot.seen)
+    if (at.idx_point >= 0 && static_cast<size_t>(at.idx_point) < snapshot.points.size())
+      own[snapshot.points[static_cast<size_t>(at.idx_point)].id] = {at.x, at.y};
   sightings.push_front(own);
   if (sightings.size() > kTrackLength) sightings.pop_back();
   for (const auto& [id, pixel] : own) {
@@ -185,22 +446,17 @@ Json LivePage::State::tracks(const Flight& flight, const std::vector<tv_map_poin
   return tracks;
 }
 
-void LivePage::update(const Flight& flight) {
-  State& s = *state_;
-  const uint64_t now = now_ns();
-  const uint64_t asked = s.asked_ns;
-  if (flight.odometry() == nullptr || flight.picture().empty() || asked == 0 ||
-      now - asked > kWatchedNs || now - s.updated_ns < kPeriodNs)
-    return;
-  s.updated_ns = now;
-  const tv_odometry_state& state = flight.state();
-  const std::vector<tv_map_point> points = flight.points();
+// The members of the page's data, without braces.
+std::string LivePage::State::text_of(const Snapshot& snapshot) {
+  const tv_odometry_state& state = snapshot.state;
+  const std::vector<tv_map_point>& points = snapshot.points;
+  for (const auto& [id, rgb] : snapshot.colours) colours[id] = rgb;
   Json json;
   json["status"] = tv_odometry_status_string(static_cast<tv_odometry_status>(state.status));
-  json["reasons"] = reasons_text(flight.frames().back());
-  json["time_s"] = rounded(flight.frames().back().time_s - flight.frames().front().time_s);
-  json["time_ms"] = rounded(flight.frames().back().time_ms);
-  json["num_frames"] = flight.frames().size();
+  json["reasons"] = snapshot.reasons;
+  json["time_s"] = rounded(snapshot.time_s);
+  json["time_ms"] = rounded(snapshot.time_ms);
+  json["num_frames"] = snapshot.num_frames;
   json["num_inliers"] = state.num_inliers;
   json["num_keyframes"] = state.num_keyframes;
   json["num_points"] = state.num_points;
@@ -208,26 +464,20 @@ void LivePage::update(const Flight& flight) {
   for (const tv_map_point& point : points) segments.insert(point.segment);
   json["num_segments"] = segments.size();
   json["unit"] = state.scale_source != TV_SCALE_UNIT ? "m" : "";
-  json["width"] = flight.picture().cols;
-  json["height"] = flight.picture().rows;
-  json["tracks"] = s.tracks(flight, points);
-  const int32_t segment = newest_segment(flight);
+  json["width"] = snapshot.picture.cols;
+  json["height"] = snapshot.picture.rows;
+  json["tracks"] = tracks(snapshot);
   Json path = Json::array(), cloud = Json::array(), colour = Json::array();
-  const std::vector<FlightFrame>& frames = flight.frames();
-  const size_t step = frames.size() / kMaxPath + 1;
-  for (size_t k = (frames.size() - 1) % step; k < frames.size(); k += step) {
-    double t[3];
-    int32_t own = -1;
-    if (position_of(flight, frames[k], t, &own) && own == segment) append(path, t);
-  }
-  const std::vector<FlightKeyframe> keyframes = flight.keyframes();
-  const std::vector<Rgb> colours = flight.colours(points, keyframes);
-  json["view"] = view_of(flight, keyframes, segment).view_from_world;
+  for (const Vector3& t : snapshot.path) append(path, t.data());
+  json["view"] = snapshot.view;
+  const std::vector<Rgb> greys = greys_of(points);
   const size_t every = points.size() / kMaxPoints + 1;
   for (size_t k = 0; k < points.size(); k += every) {
-    if (points[k].segment != segment) continue;
+    if (points[k].segment != snapshot.segment) continue;
     append(cloud, points[k].position);
-    for (const int value : colours[k]) colour.push_back(value);
+    const auto found = colours.find(points[k].id);
+    for (const int value : found != colours.end() ? found->second : greys[k])
+      colour.push_back(value);
   }
   json["path"] = path;
   json["points"] = cloud;
@@ -237,12 +487,8 @@ void LivePage::update(const Flight& flight) {
     for (const double value : state.world_from_cam_R) json["camera"].push_back(rounded(value));
     append(json["camera"], state.world_from_cam_t);
   }
-  std::vector<uint8_t> jpeg;
-  cv::imencode(".jpg", flight.picture(), jpeg, {cv::IMWRITE_JPEG_QUALITY, 80});
-  std::string data = json.dump();
-  const std::lock_guard<std::mutex> lock(s.mutex);
-  s.data.swap(data);
-  s.picture.assign(jpeg.begin(), jpeg.end());
+  const std::string text = json.dump();
+  return text.substr(1, text.size() - 2);
 }
 
 }  // namespace cli

@@ -6,9 +6,13 @@
 namespace cli {
 
 struct LivePage::State {};
-LivePage::LivePage(int) { throw BadInput("--live: this program was built without libmicrohttpd"); }
+LivePage::LivePage(int, bool) {
+  throw BadInput("--live: this program was built without libmicrohttpd");
+}
 LivePage::~LivePage() = default;
 std::string LivePage::address() const { return ""; }
 void LivePage::update(const Flight&) {}
+void LivePage::tell(const std::string&) {}
+void LivePage::show(std::string, size_t) {}
 
 }  // namespace cli

@@ -28,6 +28,7 @@
 #ifdef TWOVIEW_HAS_ROOM
 #include "odometry/room_options.h"
 #include "room_model/page.h"
+#include "room_model/preview.h"
 #include "room_model/room_files.h"
 #endif
 #ifdef TWOVIEW_HAS_DRONE
@@ -257,12 +258,15 @@ struct FlightRoom {
 };
 
 #ifdef TWOVIEW_HAS_ROOM
-// What goes wrong with the room is noted, and the flight's results are written all the same.
+// What goes wrong with the room is noted, and the flight's results are written all the same. live:
+// the page that shows it, or null.
 FlightRoom room_of(Arguments& a, FrameSource& source, FlightResult& result,
-                   const TrueRoom& true_room, const std::atomic<bool>& stop) {
+                   const TrueRoom& true_room, const std::atomic<bool>& stop, LivePage* live) {
   FlightRoom room;
   result.json["room"] = nullptr;
   if (!a.makes_room) return room;
+  // Ctrl-C in flight ends the flight, and the room is of what was flown; another one ends this.
+  clear_stop_flag();
   room.scene = room_scene(result);
   if (room.scene.views.empty()) {
     a.common.note("no room: no frame has a pose");
@@ -272,8 +276,17 @@ FlightRoom room_of(Arguments& a, FrameSource& source, FlightResult& result,
     RoomBuilder builder(room.scene, a.room);
     const Flight& flight = *result.flight;
     read_pictures_with_progress(source, flight.masks(), flight.still_mask(), builder, stop,
-                                !a.common.quiet);
+                                !a.common.quiet, [live](const std::string& words) {
+                                  if (live != nullptr) live->tell(words);
+                                });
+    if (live != nullptr) live->tell("room: the surface");
     room.model = finish_with_progress(builder, !a.common.quiet);
+    if (live != nullptr) {
+      const RoomMesh& mesh = room.model->page_mesh;
+      live->show(surface_bytes(mesh.vertices, mesh.triangles),
+                 static_cast<size_t>(room.model->keyframes_used));
+      live->tell("writing the files");
+    }
     room.scene = builder.scene();
   } catch (const BadInput& e) {
     a.common.note(std::string("no room: ") + e.what());
@@ -528,7 +541,11 @@ int odometry(Arguments& a) {
   Flight flight(*source, options);
   std::optional<LivePage> live;
   if (a.is_live || a.live_port > 0) {
-    live.emplace(a.live_port);
+#ifdef TWOVIEW_HAS_ROOM
+    live.emplace(a.live_port, a.makes_room);
+#else
+    live.emplace(a.live_port, false);
+#endif
     const std::string line = summary_line("live", "%s", live->address().c_str());
     if (common.speaks())
       print(line);
@@ -547,6 +564,7 @@ int odometry(Arguments& a) {
   if (flight.num_unreadable() == static_cast<int>(flight.frames().size()))
     throw BadInput("no frame of " + source->kind() +
                    " could be used, the first: " + flight.first_problem());
+  if (live) live->tell("finishing the map");
   {
     const Stopwatch watch(!common.quiet, "looking in the finished map for frames without a pose");
     flight.finish(stop);
@@ -563,13 +581,15 @@ int odometry(Arguments& a) {
   for (const std::string& note : {result.truth_note, result.rotation_note})
     if (!note.empty()) common.note(note);
   if (!flight.still_mask().empty()) common.note(still_note(result));
+  bool was_stopped = stop;
 #ifdef TWOVIEW_HAS_ROOM
-  const FlightRoom room = room_of(a, *source, result, true_room, stop);
+  const FlightRoom room = room_of(a, *source, result, true_room, stop, live ? &*live : nullptr);
   std::optional<DepthFolder> depth;
   if (room.model) depth.emplace(files.folder(), *room.model);
 #else
   const FlightRoom room;
 #endif
+  was_stopped = was_stopped || stop;
   const bool has_map = !result.keyframes.empty();
   ColmapFolder colmap(files.folder() / "colmap", {camera_path(a.camera), truth_file}, has_map);
   if (has_map) colmap.add_model(result);
@@ -582,7 +602,7 @@ int odometry(Arguments& a) {
   result.json["focal_length"] = lens ? lens->json() : nlohmann::ordered_json(nullptr);
   result.json["film"] = film_json(film);
   result.json["notes"] = common.notes;
-  result.json["interrupted"] = stop.load();
+  result.json["interrupted"] = was_stopped || stop;
   result.json["source"] = a.source.empty() ? source->kind() : a.source;
   result.json["options"] = options_of(a, truth_file);
   result.json["seed"] = a.flight.odometry.seed;

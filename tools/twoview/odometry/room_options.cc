@@ -61,14 +61,17 @@ nlohmann::ordered_json room_options_json(const RoomSettings& settings,
 }
 
 void read_pictures_with_progress(FrameSource& source, const Masks& masks, const cv::Mat& still,
-                                 RoomBuilder& builder, const std::atomic<bool>& stop, bool speaks) {
+                                 RoomBuilder& builder, const std::atomic<bool>& stop, bool speaks,
+                                 const std::function<void(const std::string&)>& after_keyframe) {
   const Progress line(speaks);
   size_t shown = 0;
   read_room_pictures(source, masks, still, builder, stop, [&] {
     if (builder.num_done() == shown) return;
     shown = builder.num_done();
-    line.tell("room: " + std::to_string(shown) + " of " + std::to_string(builder.num_keyframes()) +
-              " keyframes");
+    const std::string words = "room: " + std::to_string(shown) + " of " +
+                              std::to_string(builder.num_keyframes()) + " keyframes";
+    line.tell(words);
+    if (after_keyframe) after_keyframe(words);
   });
 }
 

@@ -90,7 +90,8 @@ int room(Arguments& a) {
   names.insert(names.end(), {"result.json", "report.html"});
   files.require_own({"room", names, {"result.json"}, {"frames.csv"}});
   RoomBuilder builder(from.scene, a.settings);
-  read_pictures_with_progress(*from.source, from.masks, from.still, builder, stop, !common.quiet);
+  read_pictures_with_progress(*from.source, from.masks, from.still, builder, stop, !common.quiet,
+                              {});
   RoomModel model = finish_with_progress(builder, !common.quiet);
   from.scene = builder.scene();
   if (truth) add_truth([&truth] { return *truth; }, from.scene, model, !common.quiet, common);

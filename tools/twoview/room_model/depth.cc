@@ -33,6 +33,12 @@ cv::Mat texture_of(const cv::Mat& grey) {
   return textured;
 }
 
+tv_depth_options usual_options() {
+  tv_depth_options options;
+  tv_depth_options_init(&options);
+  return options;
+}
+
 }  // namespace
 
 uint8_t* aligned(std::vector<uint8_t>& memory) {
@@ -67,8 +73,10 @@ void KnownPixels::unpack(std::vector<float>& distance, std::vector<float>& sigma
   }
 }
 
-DepthSweep::DepthSweep(const tv_camera& camera) : camera_(camera) {
-  tv_depth_options_init(&options_);
+DepthSweep::DepthSweep(const tv_camera& camera) : DepthSweep(camera, usual_options()) {}
+
+DepthSweep::DepthSweep(const tv_camera& camera, const tv_depth_options& options)
+    : camera_(camera), options_(options) {
   check(tv_depth_map_camera(&camera_, &options_, &map_camera_), "cannot make depth maps");
   check(tv_depth_size(&camera_, &options_, &memory_bytes_), "cannot make depth maps");
   memory_.resize(memory_bytes_ + TV_CONTEXT_ALIGNMENT);

@@ -43,8 +43,11 @@ using TileCounts = std::array<PixelCounts, static_cast<size_t>(kTileColumns* kTi
 // Sweeps the depth of views; its memory is made once.
 class DepthSweep {
  public:
-  // Throws BadInput where no depth map can be made of pictures of this camera.
+  // With the library's own options. Throws BadInput where no depth map can be made of pictures of
+  // this camera.
   explicit DepthSweep(const tv_camera& camera);
+  // The range of depth in the options is not read.
+  DepthSweep(const tv_camera& camera, const tv_depth_options& options);
   // What the map's pixels lie on: a pinhole.
   const tv_camera& map_camera() const { return map_camera_; }
 

@@ -167,7 +167,7 @@ RoomSection room_section(const RoomScene& scene, const RoomModel& model) {
       missing_section(model) + truth_section(model) + "</section>\n";
   section.script = "<script type=\"application/json\" id=\"room-data\">" +
                    surface_json(scene, model).dump() + "</script>\n<script>\n" + kGesturesScript +
-                   kRoomScript + "</script>\n";
+                   kSurfaceScript + kRoomScript + "</script>\n";
   return section;
 }
 

@@ -85,18 +85,20 @@ DepthRange depth_range(const RoomScene& scene, const RoomView& view) {
   return {kNearShare * at(0.01), at(0.5), kFarShare * at(0.99)};
 }
 
+bool is_new_beside(const RoomView& last, const RoomView& view, double median_depth) {
+  Vector3 step;
+  for (size_t axis = 0; axis < 3; ++axis) step[axis] = view.t[axis] - last.t[axis];
+  return norm(step) >= kNewStep * median_depth || cosine_between(view.R, last.R) <= kNewCosine;
+}
+
 std::vector<size_t> choose_keyframes(const RoomScene& scene, double median_depth) {
   std::vector<size_t> chosen;
   for (size_t k = 0; k < scene.views.size(); ++k) {
     const RoomView& view = scene.views[k];
     if (!view.is_keyframe) continue;
-    if (!chosen.empty() && scene.is_flight) {
-      const RoomView& last = scene.views[chosen.back()];
-      Vector3 step;
-      for (size_t axis = 0; axis < 3; ++axis) step[axis] = view.t[axis] - last.t[axis];
-      if (norm(step) < kNewStep * median_depth && cosine_between(view.R, last.R) > kNewCosine)
-        continue;
-    }
+    if (!chosen.empty() && scene.is_flight &&
+        !is_new_beside(scene.views[chosen.back()], view, median_depth))
+      continue;
     chosen.push_back(k);
   }
   return chosen;

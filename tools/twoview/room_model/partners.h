@@ -16,8 +16,12 @@ struct DepthRange {
 // By the scene's points that the view shows; not known with fewer than twenty of them.
 DepthRange depth_range(const RoomScene& scene, const RoomView& view);
 
-// The keyframes that get a depth map: those that see something new by a step of an eighth of the
-// median depth or a turn of 12 degrees from the one chosen before. median_depth 0: all.
+// Whether a view sees something new beside another one: by a step of an eighth of the median depth
+// or a turn of 12 degrees.
+bool is_new_beside(const RoomView& last, const RoomView& view, double median_depth);
+
+// The keyframes that get a depth map: those that see something new beside the one chosen before.
+// median_depth 0: all.
 std::vector<size_t> choose_keyframes(const RoomScene& scene, double median_depth);
 
 // The indices of up to four views of the scene that show what view `key` shows, from places a tenth

@@ -1,6 +1,5 @@
 // The surface of a room on a canvas: turn around it, walk in it, and measure between two clicks.
-// Triangles are drawn by this script itself with a depth buffer, so that no GPU, library or network
-// is needed, and so that a click knows what it hit. The page gives an element #room-data with JSON
+// The triangles are drawn by surface.js. The page gives an element #room-data with JSON
 // {low, step, positions, colours, sigma_step, sigmas, triangles, path, voxel, unit, scale_sigma}:
 // x along the walls, y across, z up from the floor; arrays are base64, little-endian: positions
 // uint16 in steps from low, colours three bytes, sigmas a byte in sigma_steps, triangles uint32,
@@ -80,54 +79,17 @@
     };
   }
 
-  // Draws the triangles into `target`: {width, height, image, near (1 / depth), hit (triangle)}.
+  // Draws the triangles into a target of surface.js.
   function rasterize(target) {
-    const { width, height } = target, frame = camera(), to = project(frame, width, height);
-    const screen = new Float32Array(3 * count), out = [0, 0, 0];
+    const frame = camera();
     const shade = view.shape ? new Uint8Array(count) : null;
-    for (let i = 0; i < count; ++i) {
-      if (!to(place[3 * i], place[3 * i + 1], place[3 * i + 2], out)) continue;
-      screen.set(out, 3 * i);
-      if (!shade) continue;
+    for (let i = 0; shade && i < count; ++i) {
       const n = normals.subarray(3 * i, 3 * i + 3);
       const facing = -(n[0] * frame.forward[0] + n[1] * frame.forward[1] + n[2] * frame.forward[2]);
       shade[i] = Math.max(40, Math.min(245, 90 + 150 * facing + 25 * n[2]));
     }
-    const pixels = target.pixels.fill(0xff1d1814), near = target.near.fill(0);
-    const hit = target.hit.fill(-1);
-    for (let t = 0; t < corners.length; t += 3) {
-      const a = corners[t], b = corners[t + 1], c = corners[t + 2];
-      const za = screen[3 * a + 2], zb = screen[3 * b + 2], zc = screen[3 * c + 2];
-      if (za === 0 || zb === 0 || zc === 0) continue;
-      const ax = screen[3 * a], ay = screen[3 * a + 1];
-      const bx = screen[3 * b] - ax, by = screen[3 * b + 1] - ay;
-      const cx = screen[3 * c] - ax, cy = screen[3 * c + 1] - ay;
-      const area = bx * cy - by * cx;
-      if (area >= 0) continue;  // from behind: rows go down, so anticlockwise is below 0
-      const x0 = Math.max(0, Math.ceil(ax + Math.min(0, bx, cx) - 0.5));
-      const x1 = Math.min(width - 1, Math.floor(ax + Math.max(0, bx, cx) + 0.5));
-      const y0 = Math.max(0, Math.ceil(ay + Math.min(0, by, cy) - 0.5));
-      const y1 = Math.min(height - 1, Math.floor(ay + Math.max(0, by, cy) + 0.5));
-      const source = shade || photo, i = shade ? 1 : 3, g = shade ? 0 : 1, u = shade ? 0 : 2;
-      const ra = source[i * a], ga = source[i * a + g], ba = source[i * a + u];
-      const rb = source[i * b] - ra, gb = source[i * b + g] - ga, bb = source[i * b + u] - ba;
-      const rc = source[i * c] - ra, gc = source[i * c + g] - ga, bc = source[i * c + u] - ba;
-      for (let y = y0; y <= y1; ++y) {
-        const dy = y - ay;
-        for (let x = x0; x <= x1; ++x) {
-          const dx = x - ax;
-          const wb = (dx * cy - dy * cx) / area, wc = (bx * dy - by * dx) / area;
-          if (wb < -1e-4 || wc < -1e-4 || wb + wc > 1.0001) continue;
-          const z = za + wb * (zb - za) + wc * (zc - za);
-          const at = y * width + x;
-          if (z <= near[at]) continue;
-          near[at] = z;
-          hit[at] = t;
-          pixels[at] = 0xff000000 | (ba + wb * bb + wc * bc) << 16 |
-            (ga + wb * gb + wc * gc) << 8 | (ra + wb * rb + wc * rc);
-        }
-      }
-    }
+    window.twoviewDrawSurface(target, { place, corners, colours: photo, shade },
+      project(frame, target.width, target.height), 0xff1d1814);
   }
 
   function bufferOf(width, height) {

@@ -12,7 +12,7 @@ import numpy as np
 
 from .. import ROOT
 from ..odometry import flights, poses, sets, surfaces
-from . import flight, model, peer, plan, tape, truth
+from . import flight, model, peer, photometric, plan, tape, truth
 
 FLIGHT_FOLDER = os.path.join(ROOT, ".cache", "flights")
 PROGRAM = os.path.join(ROOT, "build", "release", "bin", "twoview")
@@ -37,6 +37,10 @@ def arguments_of(argv):
     parser.add_argument("--plan", action="store_true",
                         help="the lines of the plan that `twoview room` draws as well, beside the "
                         "upright sides of the true room")
+    parser.add_argument("--sequences", nargs="+", metavar="FOLDER",
+                        help="set folders without a true surface, in place of rendered flights: how "
+                        "a tenth of their frames, which the room is not made from, differ from its "
+                        "mesh")
     return parser.parse_args(argv)
 
 
@@ -116,8 +120,26 @@ def line_of(label, row):
             f"{row['ms_mesh']:6.0f}")
 
 
+def compare_sequences(folders):
+    print("sequence               frames covered infer. median  mean  nearest keyf. vertices  "
+          "(left-out frames; grey levels)")
+    for folder in folders:
+        name = os.path.basename(os.path.normpath(folder))
+        with tempfile.TemporaryDirectory() as work:
+            row = photometric.measure(PROGRAM, folder, work)
+        if row is None:
+            print(f"{name:22} no room", flush=True)
+            continue
+        print(f"{name:22} {row['frames']:6d} {row['covered']:7.2f} {row['inferred']:6.2f} "
+              f"{row['median']:6.1f} {row['mean']:5.1f} {row['mean_of_nearest']:8.1f} "
+              f"{row['keyframes']:5d} {row['vertices']:8d}", flush=True)
+    return 0
+
+
 def main(argv=None):
     arguments = arguments_of(argv)
+    if arguments.sequences:
+        return compare_sequences(arguments.sequences)
     print("flight         F  prec. recall  meas. infer. keyf. vertices  depth   fuse   mesh  "
           f"(within {100 * WITHIN:g} cm; ms a keyframe, of CPU; mesh in all)")
     rows = []
