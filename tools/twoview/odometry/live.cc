@@ -43,7 +43,7 @@ constexpr uint64_t kWatchedNs = 3000000000;  // after a request somebody still l
 constexpr size_t kMaxPoints = 6000, kMaxPath = 3000;
 constexpr size_t kTrackLength = 8;  // frames of a track, the newest included
 constexpr unsigned kMaxConnections = 16, kTimeoutS = 10;
-constexpr double kShare = 0.02;  // of the tracking thread's CPU time, the most that update() takes
+constexpr double kShare = 0.02;   // of the tracking thread's CPU time, the most that update() takes
 constexpr int kMostColoured = 8;  // keyframes whose colours are looked up in one update
 constexpr auto kSurfacePeriod = std::chrono::milliseconds(300);  // between two surfaces
 
@@ -350,7 +350,8 @@ Snapshot LivePage::State::snapshot_of(const Flight& flight) {
   }
   made.segment = newest_segment(flight);
   // Which way is up changes little with each keyframe more.
-  if (made.segment != viewed_segment || keyframes.size() > viewed_keyframes + viewed_keyframes / 8) {
+  if (made.segment != viewed_segment ||
+      keyframes.size() > viewed_keyframes + viewed_keyframes / 8) {
     viewed_segment = made.segment;
     viewed_keyframes = keyframes.size();
     view = view_of(flight, keyframes, made.segment).view_from_world;

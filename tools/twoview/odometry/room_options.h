@@ -25,8 +25,8 @@ std::vector<CLI::Option*> add_room_options(CLI::App& verb, RoomSettings& setting
 nlohmann::ordered_json room_options_json(const RoomSettings& settings,
                                          const RoomTruthOptions& truth);
 
-// read_room_pictures with a progress line on a terminal; `after_keyframe` gets the same words and may
-// be empty.
+// read_room_pictures with a progress line on a terminal; `after_keyframe` gets the same words and
+// may be empty.
 void read_pictures_with_progress(FrameSource& source, const Masks& masks, const cv::Mat& still,
                                  RoomBuilder& builder, const std::atomic<bool>& stop, bool speaks,
                                  const std::function<void(const std::string&)>& after_keyframe);

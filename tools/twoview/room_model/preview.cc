@@ -13,10 +13,10 @@ namespace {
 // their time. The voxels are twice as large, which keeps the surface of a room of 8 x 6 x 3 m below
 // 100,000 triangles.
 constexpr int32_t kMapPixels = 40000, kMapPlanes = 64;
-constexpr double kVoxelShare = 0.024;          // of the median depth
+constexpr double kVoxelShare = 0.024;           // of the median depth
 constexpr size_t kRoomBytes = size_t{8} << 20;  // 7,600 blocks
-constexpr int kMostMoves = 8;                  // of maps in one settle()
-constexpr int32_t kFewestMaps = 2;             // that must have seen a surface
+constexpr int kMostMoves = 8;                   // of maps in one settle()
+constexpr int32_t kFewestMaps = 2;              // that must have seen a surface
 constexpr double kMostSigmaVoxels = 1.5;
 // A unit that has changed by more asks for other voxels.
 constexpr double kMostScale = 1.25;
@@ -39,9 +39,9 @@ void append(std::string& bytes, const T* values, size_t count) {
 struct RoomPreview::Map {
   tv_camera camera{};  // of the map
   KnownPixels pixels;
-  double depth = 0;              // median, in the unit of that time
-  PreviewPlace wanted, placed;   // placed.is_present: it is in the room
-  bool is_lost = false;          // it does not fit
+  double depth = 0;             // median, in the unit of that time
+  PreviewPlace wanted, placed;  // placed.is_present: it is in the room
+  bool is_lost = false;         // it does not fit
 };
 
 RoomPreview::RoomPreview() = default;
@@ -67,13 +67,13 @@ void RoomPreview::add(const PreviewKey& key, const std::vector<PreviewPlace>& pl
   for (const RoomView& view : key.views) views.push_back(&view);
   for (const RoomPicture& picture : key.pictures) pictures.push_back(&picture);
   TileCounts counts;
-  auto map = std::make_unique<Map>(
-      Map{sweep_->map_camera(),
-          sweep_->run(views, pictures, key.range.near, key.range.far, counts),
-          key.range.median,
-          {},
-          {},
-          false});
+  auto map =
+      std::make_unique<Map>(Map{sweep_->map_camera(),
+                                sweep_->run(views, pictures, key.range.near, key.range.far, counts),
+                                key.range.median,
+                                {},
+                                {},
+                                false});
   maps_.push_back(std::move(map));
   for (size_t k = 0; k < maps_.size() && k < places.size(); ++k) maps_[k]->wanted = places[k];
   const Map& newest = *maps_.back();

@@ -29,9 +29,10 @@ struct PreviewPlace {
   double scale = 1;
 };
 
-// A surface as a page on this computer reads it, in the computer's own byte order: how many vertices
-// and triangles there are (uint32), the vertices' positions (three float32 each), the triangles'
-// corners (three uint32 each), the vertices' colours (three bytes each). Empty without triangles.
+// A surface as a page on this computer reads it, in the computer's own byte order: how many
+// vertices and triangles there are (uint32), the vertices' positions (three float32 each), the
+// triangles' corners (three uint32 each), the vertices' colours (three bytes each). Empty without
+// triangles.
 std::string surface_bytes(const std::vector<tv_room_vertex>& vertices,
                           const std::vector<tv_room_triangle>& triangles);
 

@@ -38,9 +38,9 @@ def arguments_of(argv):
                         help="the lines of the plan that `twoview room` draws as well, beside the "
                         "upright sides of the true room")
     parser.add_argument("--sequences", nargs="+", metavar="FOLDER",
-                        help="set folders without a true surface, in place of rendered flights: how "
-                        "a tenth of their frames, which the room is not made from, differ from its "
-                        "mesh")
+                        help="set folders without a true surface, in place of rendered flights: "
+                        "how a tenth of their frames, which the room is not made from, differ "
+                        "from its mesh")
     return parser.parse_args(argv)
 
 

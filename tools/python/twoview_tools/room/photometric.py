@@ -121,14 +121,14 @@ def difference(shown, picture):
 
 
 def scores(source, hidden, mesh, folder):
-    """What the mesh shows of the frames that were left out: which share of the pixels it covers, and
-    the differences there; beside it the picture of the nearest keyframe, as it is."""
+    """What the mesh shows of the frames that were left out: which share of the pixels it covers,
+    and the differences there; beside it the picture of the nearest keyframe, as it is."""
     scale = LONGER_SIDE / max(source.camera.width, source.camera.height)
     size = (round(scale * source.camera.width), round(scale * source.camera.height))
     camera = source.camera.scaled(*size)
     eyes = source.centres[hidden]
-    distances = [np.quantile(np.linalg.norm(np.stack([mesh[0][a] for a in "xyz"], 1) - eye, axis=1),
-                             0.05) for eye in eyes]
+    positions = np.stack([mesh[0][axis] for axis in "xyz"], 1)
+    distances = [np.quantile(np.linalg.norm(positions - eye, axis=1), 0.05) for eye in eyes]
     renderer = Renderer(*mesh, camera, float(np.median(distances)))
 
     def picture(k):
