@@ -399,8 +399,8 @@ void LivePage::State::work() {
         if (taken && is_whole) preview.add(taken->key, taken->places);
         is_unsettled = is_whole && preview.settle();
         has_grown = is_whole;
-      } catch (const BadInput&) {
-        is_whole = is_unsettled = false;  // what there is stays
+      } catch (const std::exception&) {
+        is_whole = is_unsettled = false;  // the flight goes on, and what there is stays
       }
       lock.lock();
     }
