@@ -1,5 +1,7 @@
-"""Rectified pairs whose depth is known, for the stage `dense`: tv_densify beside OpenCV's
-semi-global matching.
+"""Rectified pairs whose depth is known: tv_densify beside OpenCV's semi-global matching. As a
+program it measures both in turn, in one thread, and prints the table of
+docs/decisions/0027-dense.md: python bench/dense_pairs.py [ROUNDS], with PYTHONPATH=python and
+TWOVIEW_LIBRARY=build/release/lib/libtwoview.so.
 
 motorcycle      Middlebury 2014 as scikit-image ships it (scripts/demo fetches it), with its truth.
 bicycle         Middlebury 2014, half size. The set has no truth: what is known is what matching the
@@ -14,6 +16,9 @@ light; every pixel has a noise of 1.5 grey levels.
 import ctypes
 import dataclasses
 import os
+import statistics
+import sys
+import time
 
 import cv2
 import numpy as np
@@ -235,7 +240,7 @@ class Densifier:
                         for x in (cx, cx + pair.offset)]
         self.views = [_abi.tv_image(i.ctypes.data, width, height, i.strides[0])
                       for i in pair.images]
-        self.options = library._init_struct("tv_dense_options")
+        self.options = library.make(_abi.tv_dense_options)
         self.options.max_cells = 1 << 20
         self.options.max_steps = 256
         self.R, self.t = np.eye(3), np.array([-1.0, 0, 0])
@@ -297,3 +302,34 @@ def figures(pair, found):
     error = pair.wrong(pair.disparity[both], found[both])
     return {"points": int(both.sum()), "median_percent": float(100 * np.median(error)),
             "off_percent": float(100 * np.mean(error > FAR_OFF))}
+
+
+def cpu_ms(call):
+    """CPU time of one call of this process, and what the call returned."""
+    begin = time.process_time()
+    found = call()
+    return 1e3 * (time.process_time() - begin), found
+
+
+def main(rounds):
+    cv2.setNumThreads(1)
+    library = _abi.default_library()
+    print("pair              CPU ms (of OpenCV's)    points (of OpenCV's)   median %      "
+          "off by 5 %  (ours, OpenCV)")
+    for pair in pairs():
+        ours, peer = Densifier(library, pair), OpenCv(pair)
+        ours(), peer()  # the first of each touches its memory
+        times = [(cpu_ms(ours)[0], cpu_ms(peer)[0]) for _ in range(rounds)]
+        mine, other = (statistics.median(column) for column in zip(*times))
+        ratio = statistics.median(a / b for a, b in times)
+        a = figures(pair, ours.disparities(ours()))
+        b = figures(pair, peer.disparities(peer()))
+        print(f"{pair.name:16} {mine:6.1f} {other:6.1f} ({ratio:4.2f})  "
+              f"{a['points']:7d} {b['points']:7d} ({a['points'] / b['points']:4.2f})  "
+              f"{a['median_percent']:5.2f} {b['median_percent']:5.2f}  "
+              f"{a['off_percent']:5.1f} {b['off_percent']:5.1f} "
+              f"({a['off_percent'] / max(b['off_percent'], 1e-9):4.2f})", flush=True)
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 15)
