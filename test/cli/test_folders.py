@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Tests of folders of pictures: their order, and what is left out of them."""
+import shutil
 import struct
 
 from cli_support import CliTest, camera_yaml, main, png
@@ -99,6 +100,26 @@ class Folders(CliTest):
         note = " ".join(self.track()["notes"])
         self.assertIn("frame3 (1).png (and 1 more) has the name of a copy of frame3.png", note)
         self.assertIn("where the folder holds two films", note)
+
+    def test_pictures_of_two_sequences_are_refused_by_their_names(self):
+        def odometry(*more):
+            return self.run_program("odometry", "frames", "-o", self.out, "--fps", FPS, "--camera",
+                                    self.write("own.yaml", camera_yaml()), *more)
+
+        for a, b in (("left_{}", "right_{}"), ("{}_rgb", "{}_depth"), ("cam0_{}", "cam1_{}"),
+                     ("{}", "{}_thumb")):
+            with self.subTest(a):
+                shutil.rmtree(self.folder / "frames", ignore_errors=True)
+                for k, data in enumerate(PICTURES):
+                    self.write(f"frames/{a.format(k)}.png", data)
+                    if k < 8:
+                        self.write(f"frames/{b.format(f'{k:03}')}.png", PICTURES[k + 1])
+                self.assert_refused(odometry(), "same numbers", a.format("#"), b.format("#"))
+        for other in ("clip{}_7", "0{:x}"):  # counters of one sequence, of which one is a constant
+            shutil.rmtree(self.folder / "frames", ignore_errors=True)
+            for k, data in enumerate(PICTURES):
+                self.write(f"frames/{other.format(k)}.png", data)
+            self.assertNotEqual(odometry("--max-frames", "2").returncode, 2)
 
     def test_a_link_to_nothing_is_a_missing_frame(self):
         self.fill()

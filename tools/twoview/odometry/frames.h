@@ -98,10 +98,11 @@ class FrameSource {
 
 // The folders of images: a set folder (frames.txt), TUM RGB-D (rgb.txt), EuRoC (mav0/cam0), KITTI
 // (image_0, times.txt), or any images in the order of their names at `fps` frames a second (0: not
-// given). with_imu: the imu.txt of a set folder is read where there is one. Throws BadInput with
-// one line for what is missing or wrong.
-std::unique_ptr<FrameSource> open_image_folder(const std::string& folder, double fps,
-                                               bool with_imu);
+// given). with_imu: the imu.txt of a set folder is read where there is one. is_sequence: false
+// where the order of the pictures does not count, so that they may be of several sequences. Throws
+// BadInput with one line for what is missing or wrong.
+std::unique_ptr<FrameSource> open_image_folder(const std::string& folder, double fps, bool with_imu,
+                                               bool is_sequence = true);
 
 // A film of any format that OpenCV reads. fps 0: the film's own times.
 std::unique_ptr<FrameSource> open_film(const std::string& file, double fps);

@@ -12,6 +12,7 @@
 #include "files/camera_set.h"
 #include "files/folder.h"
 #include "files/image_file.h"
+#include "files/mixed_names.h"
 #include "files/yaml_values.h"
 #include "odometry/frames.h"
 #include "odometry/measurements.h"
@@ -317,7 +318,8 @@ void refuse_fps(double fps, const Folder& folder) {
 
 }  // namespace
 
-std::unique_ptr<FrameSource> open_image_folder(const std::string& path, double fps, bool with_imu) {
+std::unique_ptr<FrameSource> open_image_folder(const std::string& path, double fps, bool with_imu,
+                                               bool is_sequence) {
   Folder folder;
   folder.path = path;
   const fs::path root = path;
@@ -365,6 +367,10 @@ std::unique_ptr<FrameSource> open_image_folder(const std::string& path, double f
       folder.frames[k].time_s = static_cast<double>(k) / fps;
     std::vector<std::string> kept;
     for (const Listed& listed : folder.frames) kept.push_back(listed.name);
+    if (const std::string kinds = mixed_names(kept); is_sequence && !kinds.empty())
+      throw BadInput(path + " holds pictures with the same numbers " + kinds +
+                     ": of several cameras or takes, or copies? Give those of one, in a folder of "
+                     "their own");
     add_note(folder, jump_words(kept));
     add_note(folder, pictures.note);
     add_cameras(folder);

@@ -288,7 +288,7 @@ RoomSource room_source_of_colmap(const std::string& model, const std::string& pi
                    " cameras: a room is made of pictures of one");
   made.scene.camera = cameras.cameras[0].second;
   made.scene.is_flight = false;
-  made.source = open_image_folder(pictures, 1, false);
+  made.source = open_image_folder(pictures, 1, false, false);
   std::map<std::string, int> indices;
   const std::vector<std::string> names = made.source->names();
   for (size_t k = 0; k < names.size(); ++k) indices[names[k]] = static_cast<int>(k);

@@ -15,6 +15,7 @@
 #include "calibration/source.h"
 #include "files/camera_file.h"
 #include "files/image_file.h"
+#include "files/mixed_names.h"
 #include "pair/result.h"
 #include "verbs/verbs.h"
 
@@ -169,12 +170,16 @@ std::vector<BoardView> find_views(Arguments& a, cv::Size& image) {
     view.thumbnail = cv::Mat::zeros(3, 4, CV_8U);
     views.push_back(view);
   };
-  if (a.video.empty())
+  if (a.video.empty()) {
     for (const std::string& note : read_images(a.images, take, leave_out)) a.common.note(note);
-  else if (live)
+    if (const std::string kinds = mixed_names(a.images); !kinds.empty())
+      a.common.note("there are pictures with the same numbers " + kinds +
+                    ": of two cameras? The camera is then that of neither");
+  } else if (live) {
     read_live(a.video, a.duration_s, take);
-  else
+  } else {
     for (const std::string& note : read_video_file(a.video, take)) a.common.note(note);
+  }
   reject_blurred(views);
   reject_duplicates(views, image);
   reject_surplus(views, a.max_views);
