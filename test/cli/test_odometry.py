@@ -546,6 +546,17 @@ class OdometryTest(CliTest):
                           (done.stdout + done.stderr).decode())
             self.assertEqual(self.result()["scale"], "unit")
 
+    def test_samples_of_another_clock_are_named(self):
+        source = self.set_folder()
+        for clock in (lambda t: 1000 * t, lambda t: t + 1.7e9):
+            self.imu(lines=[f"{clock(t):.9f} 1 0 0 0 0.01 1.5 0.015 0 {0.1 * FPS} 0 0.02"
+                            for t in TIMES])
+            self.succeed(self.odometry(source))
+            result = self.result()
+            self.assertEqual(result["scale"], "unit")
+            self.assertRegex(" ".join(result["notes"]),
+                             rf"imu.txt: only [01] of {COUNT} frames have a sample .*of one clock")
+
     def test_a_lying_attitude_is_reported_and_left_out(self):
         source = self.set_folder()
         lines = [f"{t:.9f} 1 0 0 0 0.01 1.5 0.015 0 {0.1 * FPS} 0 0.02" for t in TIMES]

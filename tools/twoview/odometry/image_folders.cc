@@ -192,7 +192,9 @@ void add_measurements(Folder& folder) {
   const std::string path = (fs::path(folder.path) / "imu.txt").string();
   if (!is_file(path)) return;
   folder.measurements = Measurements::read(path);
-  add_note(folder, folder.measurements->note());
+  std::vector<double> times_s;
+  for (const Listed& listed : folder.frames) times_s.push_back(listed.time_s);
+  add_note(folder, folder.measurements->note(times_s));
   folder.files.push_back(path);
 }
 

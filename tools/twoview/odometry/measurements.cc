@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 
 #include "base/error.h"
@@ -128,7 +129,27 @@ Measurements Measurements::read(const std::string& file) {
   return found;
 }
 
-std::string Measurements::note() const {
+std::string Measurements::note(const std::vector<double>& frame_times_s) const {
+  const std::string units = note_on_units(), clock = note_on_clock(frame_times_s);
+  return units + (units.empty() || clock.empty() ? "" : "; ") + clock;
+}
+
+std::string Measurements::note_on_clock(const std::vector<double>& frame_times_s) const {
+  if (samples_.empty() || frame_times_s.empty()) return {};
+  const auto num_met = std::count_if(frame_times_s.begin(), frame_times_s.end(),
+                                     [this](double time) { return around(time)[0] != nullptr; });
+  if (2 * static_cast<size_t>(num_met) >= frame_times_s.size()) return {};
+  char text[320];
+  std::snprintf(text, sizeof text,
+                ": only %d of %zu frames have a sample before and behind them, at most %g s apart; "
+                "its times are %.12g to %.12g s, the frames' %.12g to %.12g s: are they seconds of "
+                "one clock?",
+                static_cast<int>(num_met), frame_times_s.size(), kGapS, samples_.front().time_s,
+                samples_.back().time_s, frame_times_s.front(), frame_times_s.back());
+  return file_ + text;
+}
+
+std::string Measurements::note_on_units() const {
   if (heights_.impossible + velocities_.impossible == 0) return {};
   const std::string found = file_ + ": of " + std::to_string(samples_.size()) + " samples " +
                             std::to_string(heights_.impossible) + " heights above 3000 m and " +
@@ -139,19 +160,24 @@ std::string Measurements::note() const {
          "unknown";
 }
 
-void Measurements::add_to(SourceFrame& frame) const {
-  // The samples a and b around the frame's time; both the same one where it is at that time.
-  auto b =
-      std::lower_bound(samples_.begin(), samples_.end(), frame.time_s - kSameS,
-                       [](const Sample& sample, double time_s) { return sample.time_s < time_s; });
-  if (b == samples_.end()) return;
+std::array<const Measurements::Sample*, 2> Measurements::around(double time_s) const {
+  const auto b =
+      std::lower_bound(samples_.begin(), samples_.end(), time_s - kSameS,
+                       [](const Sample& sample, double time) { return sample.time_s < time; });
+  if (b == samples_.end()) return {};
   auto a = b;
-  if (b->time_s > frame.time_s + kSameS) {
-    if (b == samples_.begin()) return;
+  if (b->time_s > time_s + kSameS) {
+    if (b == samples_.begin()) return {};
     a = b - 1;
   }
+  if (b->time_s - a->time_s > kGapS) return {};
+  return {&*a, &*b};
+}
+
+void Measurements::add_to(SourceFrame& frame) const {
+  const auto [a, b] = around(frame.time_s);
+  if (a == nullptr) return;
   const double seconds = b->time_s - a->time_s;
-  if (seconds > kGapS) return;
   const double share = a == b ? 0 : (frame.time_s - a->time_s) / seconds;
   const auto mean = [share](double x, double y) { return x + share * (y - x); };
   if (a->attitude_sigma_rad > 0 && b->attitude_sigma_rad > 0) {

@@ -22,8 +22,8 @@ class Measurements {
   // add nothing.
   void add_to(SourceFrame& frame) const;
 
-  // What is to be said of the file; empty where nothing is.
-  std::string note() const;
+  // What is to be said of the file, for frames of these times (rising); empty where nothing is.
+  std::string note(const std::vector<double>& frame_times_s) const;
 
  private:
   struct Sample {
@@ -35,6 +35,11 @@ class Measurements {
     Vector3 velocity_m_s{};  // along the axes of the body
     double velocity_sigma_m_s = 0;
   };
+  // The samples before and behind a time, both the same one where it is at that time; null where
+  // one is missing, or where they are too far apart.
+  std::array<const Sample*, 2> around(double time_s) const;
+  std::string note_on_clock(const std::vector<double>& frame_times_s) const;
+  std::string note_on_units() const;
   Sample sample_of(const std::vector<double>& numbers, const std::string& where);
   bool are_metres() const;
 
