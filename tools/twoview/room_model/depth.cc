@@ -113,6 +113,13 @@ void DepthSweep::bring_to_map(const cv::Mat& picture, cv::Mat& out, int interpol
   cv::remap(small, out, map_x_, map_y_, interpolation, cv::BORDER_CONSTANT);
 }
 
+cv::Mat DepthSweep::shown_by(const RoomPicture& picture) const {
+  cv::Mat shown;
+  bring_to_map(picture.mask.empty() ? cv::Mat(picture.luma.size(), CV_8U, 255) : picture.mask,
+               shown, cv::INTER_NEAREST);
+  return shown;
+}
+
 KnownPixels DepthSweep::run(const std::vector<const RoomView*>& views,
                             const std::vector<const RoomPicture*>& pictures, double near_depth,
                             double far_depth, TileCounts& tiles) {
@@ -131,14 +138,14 @@ KnownPixels DepthSweep::run(const std::vector<const RoomView*>& views,
         "the depth of " + views[0]->name);
   const RoomPicture& picture = *pictures[0];
   const cv::Size size(map_camera_.width, map_camera_.height);
-  cv::Mat bgr, rgb(size, CV_8UC3, rgb_.data()), mask;
+  cv::Mat bgr, rgb(size, CV_8UC3, rgb_.data());
   bring_to_map(picture.colour.empty() ? picture.luma : picture.colour, bgr, cv::INTER_LINEAR);
   cv::cvtColor(bgr, rgb, bgr.channels() == 1 ? cv::COLOR_GRAY2RGB : cv::COLOR_BGR2RGB);
-  if (!picture.mask.empty()) bring_to_map(picture.mask, mask, cv::INTER_NEAREST);
+  const cv::Mat shown = shown_by(picture);
   const cv::Mat textured = texture_of(cv::Mat(size, CV_8U, grey_.data()));
   for (size_t i = 0; i < distance_.size(); ++i) {
     PixelCounts& counts = tiles[tile_of(i)];
-    if (!mask.empty() && mask.data[i] == 0) {
+    if (shown.data[i] == 0) {
       distance_[i] = 0;
     } else if (witnesses_[i] >= kFewestWitnesses && distance_[i] > 0) {
       ++counts.measured;
@@ -155,8 +162,9 @@ KnownPixels DepthSweep::run(const std::vector<const RoomView*>& views,
 void DepthSweep::count_unmapped(const RoomPicture& picture, TileCounts& tiles) {
   cv::Mat grey;
   bring_to_map(picture.luma, grey, cv::INTER_LINEAR);
-  const cv::Mat textured = texture_of(grey);
+  const cv::Mat textured = texture_of(grey), shown = shown_by(picture);
   for (size_t i = 0; i < grey.total(); ++i) {
+    if (shown.data[i] == 0) continue;
     PixelCounts& counts = tiles[tile_of(i)];
     ++(textured.data[i] == 0 ? counts.no_texture : counts.one_place);
   }

@@ -63,6 +63,8 @@ class DepthSweep {
 
  private:
   size_t tile_of(size_t pixel) const;
+  // 0 where the map lies beyond the picture, whose lens bends its edge inwards, or on its mask's 0.
+  cv::Mat shown_by(const RoomPicture& picture) const;
   void bring_to_map(const cv::Mat& picture, cv::Mat& out, int interpolation) const;
 
   tv_camera camera_, map_camera_;
