@@ -99,12 +99,22 @@ RoomBuilder::RoomBuilder(RoomScene scene, const RoomSettings& settings)
     for (const size_t view : job.views) ++uses_[view];
   tv_room_options options;
   tv_room_options_init(&options);
-  options.truncation_voxels = kTruncationVoxels;
-  if (settings_.voxel > 0)
-    options.voxel = settings_.voxel;
-  else if (median_depth_ > 0)
-    options.voxel = two_digits(kVoxelShare * median_depth_);
   first_voxel_ = options.voxel;
+  if (settings_.voxel > 0)
+    first_voxel_ = settings_.voxel;
+  else if (median_depth_ > 0)
+    first_voxel_ = two_digits(kVoxelShare * median_depth_);
+  begin(first_voxel_);
+}
+
+// Makes the room anew, and empty.
+void RoomBuilder::begin(double voxel) {
+  tv_room_options options;
+  tv_room_options_init(&options);
+  options.voxel = voxel_ = voxel;
+  // The standard deviations do not grow with the voxel.
+  options.truncation_voxels =
+      std::max(2, static_cast<int32_t>(std::ceil(kTruncationVoxels * first_voxel_ / voxel)));
   const size_t bytes = static_cast<size_t>(settings_.max_memory_mib) << 20;
   memory_.resize(bytes + TV_CONTEXT_ALIGNMENT);
   check(tv_room_init(&options, aligned(memory_), bytes, &room_), "cannot make a room");
@@ -156,7 +166,7 @@ void RoomBuilder::run(const Job& job) {
   maps_.push_back(
       {job.key, sweep_.run(views, pictures, job.range.near, job.range.far, counts_[job.key])});
   const double swept = cpu_ms();
-  fuse(maps_.back());
+  fuse_newest();
   ms_depth_ += swept - before;
   ms_fusion_ += cpu_ms() - swept;
 }
@@ -174,16 +184,28 @@ void RoomBuilder::fill(const Map& map, tv_depth_map& out) {
   out.channels = 3;
 }
 
-void RoomBuilder::fuse(const Map& map) {
+// False where the memory is full.
+bool RoomBuilder::add(const Map& map) {
   const RoomView& view = scene_.views[map.view];
   tv_depth_map given;
   fill(map, given);
-  tv_status status = TV_OK;
-  // What is in the room stays in it, with voxels of twice the side.
-  while ((status = tv_room_add(room_, &sweep_.map_camera(), view.R.data(), view.t.data(),
-                               &given)) == TV_ERR_CAPACITY)
-    check(tv_room_coarsen(room_), "the room does not fit into --max-memory");
+  const tv_status status =
+      tv_room_add(room_, &sweep_.map_camera(), view.R.data(), view.t.data(), &given);
+  if (status == TV_ERR_CAPACITY) return false;
   check(status, "the depth map of " + view.name);
+  return true;
+}
+
+// Where the memory is full, all maps are fused again with voxels of twice the side. In a room that
+// was coarsened as it is, no map could see through what is added later, and no plane be carried.
+void RoomBuilder::fuse_newest() {
+  constexpr double kMostDoubled = 65536;
+  if (add(maps_.back())) return;
+  do {
+    if (voxel_ > kMostDoubled * first_voxel_)
+      throw BadInput("the room does not fit into --max-memory");
+    begin(2 * voxel_);
+  } while (!std::all_of(maps_.begin(), maps_.end(), [this](const Map& map) { return add(map); }));
 }
 
 void RoomBuilder::find_up(RoomModel& model) const {

@@ -47,7 +47,9 @@ class RoomBuilder {
   };
   void run(const Job& job);
   void run_until(size_t view);
-  void fuse(const Map& map);
+  void begin(double voxel);
+  bool add(const Map& map);
+  void fuse_newest();
   void fill(const Map& map, tv_depth_map& out);
   void find_up(RoomModel& model) const;
   void find_planes(RoomModel& model) const;
@@ -65,7 +67,7 @@ class RoomBuilder {
   DepthSweep sweep_;
   std::vector<uint8_t> memory_;
   tv_room* room_ = nullptr;  // in memory_
-  double median_depth_ = 0, first_voxel_ = 0;
+  double median_depth_ = 0, first_voxel_ = 0, voxel_ = 0;
   std::vector<Job> jobs_;  // in the order in which they can be run
   size_t next_job_ = 0;
   std::vector<int> uses_;                   // by how many jobs that are open a view is needed
