@@ -650,6 +650,10 @@ class RoomTest(CliTest):
         self.assertGreaterEqual(room["voxel"], 0.04)
         self.assertIn("memory was full", done.stdout.decode())
         self.assertEqual(room["memory_bytes"], 1 << 20)
+        # Maps are fused anew as thick as their standard deviations ask, and not as before in voxels
+        # that have doubled: twice the memory is enough for half the voxel.
+        self.succeed(self.room("--voxel", "0.02", "--max-memory", "2"))
+        self.assertLessEqual(self.result()["room"]["voxel"], room["voxel"] / 2)
 
     # -- bad input ----------------------------------------------------------------------------
 
