@@ -52,7 +52,8 @@ def seen_parts(sides, seen):
                                       np.tile(heights, len(foot))[:, None]], 1))
     is_seen, begin, parts = seen(np.concatenate(points)), 0, []
     for foot, of_side in zip(feet, points):
-        count = is_seen[begin:begin + len(of_side)].reshape(len(foot), -1).sum(1)
+        rows = len(of_side) // max(len(foot), 1)  # none for a side thinner than STEP
+        count = is_seen[begin:begin + len(of_side)].reshape(len(foot), rows).sum(1)
         begin += len(of_side)
         parts.append((foot[count * STEP >= LEAST_SEEN], float(count.sum()) * STEP**2))
     return parts
