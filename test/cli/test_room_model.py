@@ -489,6 +489,9 @@ class RoomTest(CliTest):
         self.assert_refused(self.room(folder=model, out=other), "--source is required", out=other)
         self.assert_refused(self.room("--source", self.folder, folder=model, out=other),
                             "none of the pictures", out=other)
+        (model / "images.txt").write_text("1 0 0 0 0 1 2 3 1 00000.png\n\n")
+        self.assert_refused(self.room("--source", pictures / "images", folder=model, out=other),
+                            "images.txt: line 1 has a quaternion of length 0", out=other)
         (model / "cameras.txt").write_text("1 PINHOLE 320 240 300 300 160 120\n"
                                            "2 PINHOLE 320 240 300 300 160 120\n")
         self.assert_refused(self.room("--source", pictures / "images", folder=model, out=other),

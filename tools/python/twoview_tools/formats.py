@@ -94,10 +94,15 @@ def _field(text):
         raise FormatError(f"'{text}' {error}") from None
 
 
+MOST_TURNS = 45  # nobody turns a picture so often: such a number is one of degrees
+
+
 def _turns(text):
     value = _field(text)
     if value != math.floor(value) or abs(value) > 1e6:
         raise FormatError(f"'{text}' is no number of quarter turns")
+    if abs(value) >= MOST_TURNS:
+        raise FormatError(f"'{text}' is no number of quarter turns (1 is 90 degrees)")
     return int(value) & 3
 
 
@@ -109,6 +114,8 @@ def _matrix(name, fields):
         raise FormatError(f"{name} has skew, which is not supported")
     if K[1, 0] or K[2].tolist() != [0, 0, 1]:
         raise FormatError(f"{name} is not [fx 0 cx 0 fy cy 0 0 1]")
+    if max(K[0, 0], K[1, 1]) < 20 and np.abs(K[:2, 2]).max() <= 2:
+        raise FormatError(f"{name} is normalised: pixels are needed")
     return K
 
 

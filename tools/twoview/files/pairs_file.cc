@@ -28,6 +28,9 @@ int parse_turns(const std::string& text) {
   const double value = parse_number(text);
   if (value != std::floor(value) || std::abs(value) > 1e6)
     throw BadInput("'" + text + "' is no number of quarter turns");
+  constexpr double kDegrees = 45;  // nobody turns a picture so often
+  if (std::abs(value) >= kDegrees)
+    throw BadInput("'" + text + "' is no number of quarter turns (1 is 90 degrees)");
   return static_cast<int>(value) & 3;
 }
 
@@ -37,6 +40,11 @@ void check_K(const std::array<double, 9>& K, const char* name) {
   if (K[1] != 0) throw BadInput(what + " has skew, which is not supported");
   if (K[3] != 0 || K[6] != 0 || K[7] != 0 || K[8] != 1)
     throw BadInput(what + " is not [fx 0 cx 0 fy cy 0 0 1]");
+  // Of pixels such a matrix would be of a picture of a few of them.
+  constexpr double kMostFocal = 20, kMostCentre = 2;
+  if (K[0] < kMostFocal && K[4] < kMostFocal && std::abs(K[2]) <= kMostCentre &&
+      std::abs(K[5]) <= kMostCentre)
+    throw BadInput(what + " is normalised: pixels are needed");
 }
 
 Pair parse_line(const std::string& line) {

@@ -219,6 +219,15 @@ Matrix3 rotation_of_quaternion(double x, double y, double z, double w) {
           s * (x * z - w * y),     s * (y * z + w * x),     1 - s * (x * x + y * y)};
 }
 
+void require_unit_quaternion(const double* q, const std::string& file, int line) {
+  const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+  if (!(length > 1e-6)) refuse_line(file, line, "has a quaternion of length 0");
+  if (std::abs(length - 1) > kUnitError)
+    refuse_line(file, line,
+                "has a quaternion of length " + std::to_string(length) +
+                    ", not 1: is it another quantity?");
+}
+
 double angle_of(const Matrix3& R) {
   const std::array<double, 4> q = quaternion_of(R);
   return 2 * std::atan2(std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]), q[3]);
@@ -271,13 +280,8 @@ TruePoses load_trajectory(const std::string& file, const std::vector<double>& fr
       at.pose.R = made_rotation(at.pose.R, file + ": line " + std::to_string(line.number));
     } else {
       const auto value = [&](size_t column) { return n[layout.at[column]]; };
-      const double length = std::sqrt(value(4) * value(4) + value(5) * value(5) +
-                                      value(6) * value(6) + value(7) * value(7));
-      if (!(length > 1e-6)) refuse_line(file, line.number, "has a quaternion of length 0");
-      if (std::abs(length - 1) > kUnitError)
-        refuse_line(file, line.number,
-                    "has a quaternion of length " + std::to_string(length) +
-                        ", not 1: is it another quantity?");
+      const double q[4] = {value(4), value(5), value(6), value(7)};
+      require_unit_quaternion(q, file, line.number);
       at.time_s = value(0) * layout.unit_s;
       at.pose.t = {value(1), value(2), value(3)};
       at.pose.R = rotation_of_quaternion(value(4), value(5), value(6), value(7));

@@ -28,6 +28,10 @@ Pose inverse(const Pose& pose);
 std::array<double, 4> quaternion_of(const Matrix3& R);
 Matrix3 rotation_of_quaternion(double x, double y, double z, double w);
 
+// Throws BadInput that names the line where four numbers of a file are no unit quaternion: a length
+// of 0, or more than a tenth off 1.
+void require_unit_quaternion(const double* q, const std::string& file, int line);
+
 // The angle of a rotation in radians, in [0, pi].
 double angle_of(const Matrix3& R);
 

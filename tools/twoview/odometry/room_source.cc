@@ -58,6 +58,7 @@ std::vector<SegmentPose> read_poses(const std::string& path) {
     bool good = words.size() == 8;
     for (size_t k = 0; good && k < 8; ++k) good = to_number(words[k], n[k]);
     if (!good) throw BadInput(path + ": line " + std::to_string(number) + " is no pose");
+    require_unit_quaternion(n + 4, path, number);
     SegmentPose pose{std::string(words[0]), segment, {}};
     pose.pose = {rotation_of_quaternion(n[4], n[5], n[6], n[7]), {n[1], n[2], n[3]}};
     poses.push_back(pose);
@@ -311,6 +312,7 @@ RoomSource room_source_of_colmap(const std::string& model, const std::string& pi
     for (size_t k = 0; good && k < 9; ++k) good = to_number(words[k], n[k]);
     if (!good)
       throw BadInput(file("images.txt") + ": line " + std::to_string(number) + " is no pose");
+    require_unit_quaternion(n + 1, file("images.txt"), number);
     const std::string name(line.substr(static_cast<size_t>(words[9].data() - line.data())));
     const auto found = indices.find(name.substr(0, name.find_last_not_of("\r ") + 1));
     if (found == indices.end()) {
