@@ -13,6 +13,22 @@ if(TWOVIEW_SANITIZE)
   set(TWOVIEW_TEST_PREFIX "asan/")
 endif()
 
+# These take more than ten seconds in a release build. `scripts/test --quick` leaves them out (label
+# long), and the whole run begins with them.
+set(TWOVIEW_LONG_TESTS
+  api/odometry_api
+  cli/bad_input cli/calibrate cli/camera_files cli/drone cli/drone_bad_input cli/evaluate cli/films
+  cli/folders cli/mask cli/mavlink cli/odometry cli/own_matches cli/photographs cli/principal_point
+  cli/reconstruct cli/recording cli/rerun cli/room_model
+  examples/examples
+  golden/determinism
+  property/bundle_covariance property/principal_point
+  python/accuracy_belief python/bad_input python/colmap_export python/colmap_import
+  python/compare_bad_input python/compare_reference python/compare_report python/odometry_runs
+  python/odometry_tour python/package_wheel python/paper
+  rules/footprint_arm rules/packaging
+  unit/bundle_ceres unit/triangulation_optimal unit/window_ceres)
+
 # tv_register_test(name LABEL label COMMAND command... [DIRECTORY working_directory])
 # Registers the command as the test label/name, with the time limit and the environment of all
 # tests.
@@ -30,6 +46,9 @@ function(tv_register_test name)
     SKIP_RETURN_CODE ${TWOVIEW_SKIP_CODE}
     TIMEOUT 600
     ENVIRONMENT "${environment}")
+  if("${arg_LABEL}/${name}" IN_LIST TWOVIEW_LONG_TESTS)
+    set_tests_properties(${test} PROPERTIES LABELS "${arg_LABEL};long" COST 10)
+  endif()
 endfunction()
 
 # Replaces Unity's end of a program by one that returns TWOVIEW_SKIP_CODE as described above
