@@ -22,13 +22,15 @@ if(TWOVIEW_SANITIZE)
   add_compile_definitions(TWOVIEW_SANITIZED)
 endif()
 
-# tv_precompile(target header...) has the target's C++ sources begin with these headers, parsed once.
-# This is for debug builds, such as those of the sanitizers and of the fuzz targets. A release build
-# has several -O levels in a target, and it must find a forgotten #include. A launcher turns this
-# off, because ccache would not keep the objects. clang refuses the headers where a source has
-# options of its own that change code.
+# tv_precompile(target header...) has the target's C++ sources begin with these headers, parsed once:
+# in debug builds, such as those of the sanitizers and of the fuzz targets, and where
+# TWOVIEW_PRECOMPILE asks for it. Other release builds do without, so that one of them finds a
+# forgotten #include. A launcher turns this off, because ccache would not keep the objects. clang
+# refuses the headers where a source has options of its own that change code.
+option(TWOVIEW_PRECOMPILE "Parse the headers of Eigen once for each target, in release builds too" OFF)
+mark_as_advanced(TWOVIEW_PRECOMPILE)
 function(tv_precompile target)
-  if(CMAKE_BUILD_TYPE STREQUAL "Debug" AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
+  if((CMAKE_BUILD_TYPE STREQUAL "Debug" OR TWOVIEW_PRECOMPILE) AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
     list(TRANSFORM ARGN REPLACE "^(.+)$" "$<$<COMPILE_LANGUAGE:CXX>:<\\1$<ANGLE-R>>"
       OUTPUT_VARIABLE headers)
     target_precompile_headers(${target} PRIVATE ${headers})

@@ -16,15 +16,19 @@ LAYERS = {
     "feature": {"image", "kernels", "base"},
     "match": {"feature", "image", "kernels", "base"},
     "geometry": {"kernels", "base"},
-    "robust": {"geometry", "kernels", "base"},
-    "odometry": {"match", "robust", "feature", "image", "geometry", "kernels", "base"},
-    "dense": {"geometry", "kernels", "base"},
+    "triangulation": {"geometry", "kernels", "base"},
+    "robust": {"triangulation", "geometry", "kernels", "base"},
+    "pose": {"robust", "geometry", "kernels", "base"},
+    "adjust": {"pose", "robust", "geometry", "kernels", "base"},
+    "odometry": {"adjust", "pose", "match", "robust", "feature", "image", "geometry", "kernels",
+                 "base"},
+    "dense": {"triangulation", "geometry", "kernels", "base"},
     "room": {"geometry", "base"},
-    "api": {"room", "dense", "odometry", "match", "robust", "feature", "image", "geometry",
-            "kernels", "base"},
+    "api": {"room", "dense", "odometry", "adjust", "pose", "match", "robust", "feature", "image",
+            "triangulation", "geometry", "kernels", "base"},
 }
 WITHOUT_EIGEN = {"base", "kernels", "image", "feature", "match"}
-WITHOUT_PIXELS = {"geometry", "robust"}
+WITHOUT_PIXELS = {"geometry", "triangulation", "robust", "pose", "adjust"}
 PIXELS = ("twoview/image.h", "image/")
 # Headers whose use would bring in the heap, files, threads, clocks or libstdc++.
 BANNED = {

@@ -107,7 +107,7 @@ def build(folder, architecture, compiler, level, keep_footprint):
     there = folder / f"{architecture}-{compiler}-{level}"
     options = [f"-DCMAKE_BUILD_TYPE={'Release' if level == 'O2' else 'Debug'}",
                "-DCMAKE_C_FLAGS_DEBUG=-O0", "-DCMAKE_CXX_FLAGS_DEBUG=-O0",
-               "-DTWOVIEW_TOOLS=OFF", "-DBUILD_TESTING=ON"]
+               "-DTWOVIEW_TOOLS=OFF", "-DBUILD_TESTING=ON", "-DTWOVIEW_PRECOMPILE=ON"]
     if architecture != "x86-64":
         options.append(f"--toolchain={ROOT}/cmake/toolchains/{architecture}.cmake")
     if compiler == "clang":

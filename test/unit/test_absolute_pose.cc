@@ -2,8 +2,8 @@
 // cost against its definition, and the normal equations against finite differences.
 #include <cmath>
 
-#include "odometry/absolute_pose.h"
-#include "odometry/reprojection.h"
+#include "pose/absolute_pose.h"
+#include "pose/reprojection.h"
 #include "support/scene.h"
 
 void setUp(void) {}

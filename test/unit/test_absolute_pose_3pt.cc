@@ -5,7 +5,7 @@
 #include <cmath>
 #include <complex>
 
-#include "odometry/absolute_pose_3pt.h"
+#include "pose/absolute_pose_3pt.h"
 #include "support/scene.h"
 
 void setUp(void) {}

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "base/random.h"
-#include "geometry/triangulation.h"
+#include "triangulation/triangulation.h"
 #include "unity.h"
 
 void setUp(void) {}

@@ -7,7 +7,7 @@
 #include <opencv2/calib3d.hpp>
 
 #include "base/random.h"
-#include "geometry/triangulation.h"
+#include "triangulation/triangulation.h"
 // unity.h comes after OpenCV: it defines isnan and isinf as macros.
 #include "unity.h"
 

@@ -14,7 +14,7 @@
 #include <cstdlib>
 
 #include "base/random.h"
-#include "geometry/triangulation.h"
+#include "triangulation/triangulation.h"
 #include "unity.h"
 
 void setUp(void) {}

@@ -7,9 +7,9 @@
 #include <cstdio>
 #include <cstring>
 
-#include "odometry/block_cholesky.h"
-#include "odometry/window_observation.h"
-#include "odometry/window_prior.h"
+#include "adjust/block_cholesky.h"
+#include "adjust/window_observation.h"
+#include "adjust/window_prior.h"
 #include "support/window_scene.h"
 #include "unity.h"
 

@@ -1,4 +1,4 @@
-#include "odometry/block_cholesky.h"
+#include "adjust/block_cholesky.h"
 
 #include <cmath>
 

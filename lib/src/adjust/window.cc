@@ -1,4 +1,4 @@
-#include "odometry/window.h"
+#include "adjust/window.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 
 #include "base/math.h"
 #include "geometry/vector3.h"
-#include "odometry/window_system.h"
+#include "adjust/window_system.h"
 
 namespace tv {
 namespace {

@@ -1,4 +1,4 @@
-#include "odometry/window_observation.h"
+#include "adjust/window_observation.h"
 
 #include "base/math.h"
 

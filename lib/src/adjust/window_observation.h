@@ -6,7 +6,7 @@
 #include <cstdint>
 
 #include "geometry/vector3.h"
-#include "odometry/block_cholesky.h"
+#include "adjust/block_cholesky.h"
 #include "twoview/window.h"
 
 namespace tv {

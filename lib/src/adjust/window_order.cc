@@ -4,7 +4,7 @@
 #include <cstring>
 
 #include "base/math.h"
-#include "odometry/window_system.h"
+#include "adjust/window_system.h"
 
 namespace tv {
 namespace {

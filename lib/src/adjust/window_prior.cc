@@ -1,4 +1,4 @@
-#include "odometry/window_prior.h"
+#include "adjust/window_prior.h"
 
 #include <algorithm>
 #include <cmath>

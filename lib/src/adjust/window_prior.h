@@ -4,7 +4,7 @@
 // test/unit/test_window.cc.
 #pragma once
 
-#include "odometry/rigid.h"
+#include "pose/rigid.h"
 #include "twoview/window.h"
 
 namespace tv {

@@ -1,4 +1,4 @@
-#include "odometry/window_system.h"
+#include "adjust/window_system.h"
 
 #include <algorithm>
 #include <cmath>

@@ -4,9 +4,9 @@
 #pragma once
 
 #include "geometry/vector3.h"
-#include "odometry/block_cholesky.h"
-#include "odometry/window_observation.h"
-#include "odometry/window_prior.h"
+#include "adjust/block_cholesky.h"
+#include "adjust/window_observation.h"
+#include "adjust/window_prior.h"
 
 namespace tv {
 

@@ -1,4 +1,4 @@
-// The entry points of the absolute pose: they validate, call odometry/absolute_pose.h and write the
+// The entry points of the absolute pose: they validate, call pose/absolute_pose.h and write the
 // result.
 #include "twoview/absolute_pose.h"
 
@@ -7,7 +7,7 @@
 #include "api/sized.h"
 #include "api/validate.h"
 #include "api/within.h"
-#include "odometry/absolute_pose.h"
+#include "pose/absolute_pose.h"
 
 namespace tv {
 namespace {

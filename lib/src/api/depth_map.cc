@@ -10,7 +10,7 @@
 #include "dense/parallel_view.h"
 #include "dense/plane_sweep.h"
 #include "geometry/essential.h"
-#include "geometry/triangulation_frame.h"
+#include "triangulation/frame.h"
 
 namespace tv {
 namespace {

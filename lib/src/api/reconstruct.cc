@@ -14,7 +14,7 @@
 #include "api/within.h"
 #include "feature/tilts.h"
 #include "geometry/essential.h"
-#include "geometry/triangulation.h"
+#include "triangulation/triangulation.h"
 #include "image/pyramid.h"
 #include "match/align.h"
 #include "match/rank.h"

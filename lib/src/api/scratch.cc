@@ -6,7 +6,7 @@
 #include "feature/tilts.h"
 #include "match/match.h"
 #include "match/witness.h"
-#include "odometry/absolute_pose.h"
+#include "pose/absolute_pose.h"
 #include "robust/bundle.h"
 #include "robust/two_view.h"
 #include "twoview/reconstruct.h"

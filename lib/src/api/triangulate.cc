@@ -1,5 +1,5 @@
 // The entry points of triangulation and of corrected matches: they validate and call
-// geometry/triangulation.h.
+// triangulation/triangulation.h.
 #include "twoview/triangulate.h"
 
 #include <cstddef>
@@ -8,7 +8,7 @@
 #include "api/enum_value.h"
 #include "api/validate.h"
 #include "geometry/essential.h"
-#include "geometry/triangulation.h"
+#include "triangulation/triangulation.h"
 
 namespace {
 

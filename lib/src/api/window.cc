@@ -1,4 +1,4 @@
-// The entry points of the window's bundle adjustment: they validate, call odometry/window.h, and
+// The entry points of the window's bundle adjustment: they validate, call adjust/window.h, and
 // write the result.
 #include "twoview/window.h"
 
@@ -9,7 +9,7 @@
 #include "api/within.h"
 #include "geometry/essential.h"
 #include "geometry/vector3.h"
-#include "odometry/window.h"
+#include "adjust/window.h"
 
 namespace tv {
 namespace {

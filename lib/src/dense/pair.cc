@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "base/math.h"
-#include "geometry/triangulation_frame.h"
+#include "triangulation/frame.h"
 #include "twoview/context.h"
 
 namespace tv {

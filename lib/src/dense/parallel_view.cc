@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "dense/sweep.h"
-#include "geometry/triangulation_frame.h"
+#include "triangulation/frame.h"
 
 namespace tv {
 namespace {

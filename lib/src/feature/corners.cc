@@ -146,18 +146,18 @@ int32_t spread_over_grid(Corner* corners, int32_t count, int32_t wanted, const L
   return taken;
 }
 
-// A total order, best first, so that the result does not depend on the sorting algorithm.
-struct IsBetter {
+// A total order of keypoints of one score, so that the result does not depend on the sorting
+// algorithm.
+struct ComesBefore {
   bool operator()(const tv_keypoint& a, const tv_keypoint& b) const {
-    if (a.score != b.score) return a.score > b.score;
     if (a.level != b.level) return a.level < b.level;
     if (a.y != b.y) return a.y < b.y;
     return a.x < b.x;
   }
 };
 
-// Writes the keypoints to `sorted` in the order of IsBetter: first by a counting sort by score,
-// which is a byte; only runs of equal scores, which are short, then need sorting.
+// Writes the keypoints to `sorted`, best first: by a counting sort by score, which is a byte; only
+// runs of equal scores, which are short, then need sorting.
 void sort_keypoints(const tv_keypoint* keypoints, int32_t count, tv_keypoint* sorted) {
   int32_t ends[257] = {0};  // for each score, the number of higher ones: where its next one goes
   const auto place = [](const tv_keypoint& k) { return 255 - static_cast<int32_t>(k.score); };
@@ -165,7 +165,7 @@ void sort_keypoints(const tv_keypoint* keypoints, int32_t count, tv_keypoint* so
   for (int32_t p = 0; p < 256; ++p) ends[p + 1] += ends[p];
   for (int32_t k = 0; k < count; ++k) sorted[ends[place(keypoints[k])]++] = keypoints[k];
   for (int32_t p = 0, begin = 0; p < 256; begin = ends[p++]) {
-    std::sort(sorted + begin, sorted + ends[p], IsBetter());
+    std::sort(sorted + begin, sorted + ends[p], ComesBefore());
   }
 }
 

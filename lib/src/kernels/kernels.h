@@ -256,7 +256,7 @@ typedef struct tvk_triangulate_pair {
    triangulate: the points of `count` matches of two pinholes by Midpoint, Linear-LS or Iterative-LS
    (`method`, a tv_triangulation). A pixel is two numbers, x and y. A match whose point is neither
    TV_POINT_OK nor TV_POINT_BEHIND, or that needs more care, gets status -1 and zeros; the caller
-   solves it by geometry/triangulation.cc. Returns whether there is such a match. */
+   solves it by triangulation/triangulation.cc. Returns whether there is such a match. */
 #define TVK_DETECT_LIST(X)                                                                       \
   X(fast_score_row, void,                                                                        \
     (const uint8_t *const rows[7], int32_t width, int32_t arc, int32_t threshold,                \

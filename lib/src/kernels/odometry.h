@@ -26,16 +26,16 @@ typedef struct tvk_reduced_system {
 /* The contract of each kernel.
 
    sighting_costs: the sum of the costs of TVK_SIGHTING_BLOCK matches from `first` on, whose numbers
-   are in twelve arrays: the point X, the two rows of J and a (odometry/sightings.h). pose: R,
+   are in twelve arrays: the point X, the two rows of J and a (pose/sightings.h). pose: R,
    row-major, and t. With p = R X + t, a match costs TVK_SIGHTING_COST times |J p|^2 inverse_sq /
    (a . p)^2, rounded down, where that is less than 1 and a . p > 0, and otherwise times 1.
 
    subtract_products: of a symmetric matrix whose lower triangle is stored as in
-   odometry/block_cholesky.h, subtracts Z_a Z_b' from the 6x6 blocks (blocks[a], blocks[b]) for all
+   adjust/block_cholesky.h, subtracts Z_a Z_b' from the 6x6 blocks (blocks[a], blocks[b]) for all
    a and all b <= a, where blocks ascends. Z_a is 6x3; its columns are at columns + 6 a, `pitch`
    entries apart. The three products are added first, so that each entry changes once.
 
-   add_observation: adds the terms of an observation of a window (odometry/window_observation.h) to
+   add_observation: adds the terms of an observation of a window (adjust/window_observation.h) to
    those of its point, and, if `block` is not negative, to those of its view. observation: J (2x3,
    column-major), then n; R: cam_from_world, row-major; linear: the nine numbers of a
    tv::LinearObservation. The derivatives of the residual e by x are h = (J - e n') / depth; half

@@ -1,5 +1,5 @@
 /* The kernel triangulate: points from the pixels of two pinhole cameras by Midpoint, Linear-LS or
-   Iterative-LS, TVK_LANES matches at a time. It computes what geometry/triangulation.cc computes
+   Iterative-LS, TVK_LANES matches at a time. It computes what triangulation/triangulation.cc computes
    for one match of any lens, in coordinates of the image planes z = 1. R. Hartley, P. Sturm,
    "Triangulation", CVIU 68(2), 1997. docs/algorithms/triangulation.md. */
 
@@ -77,7 +77,7 @@ static inline float_lanes angle_of(float_lanes sine, float_lanes cosine) {
   return floats_select(cosine < 0.0f, 3.14159265f - angle, angle);
 }
 
-/* Linear-LS and Iterative-LS: the equations of geometry/triangulation_linear.cc for two image
+/* Linear-LS and Iterative-LS: the equations of triangulation/linear.cc for two image
    planes. Clears the bits of `settled` for lanes where the iteration does not converge. */
 static inline void least_squares_point(const tvk_triangulate_pair *p, const ray_lanes *ray0,
                                        const ray_lanes *ray1, int iterative, lanes point[3],

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "odometry/absolute_pose.h"
-#include "odometry/reprojection.h"
+#include "pose/absolute_pose.h"
+#include "pose/reprojection.h"
 #include "odometry/search.h"
 
 namespace tv {

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "base/arena.h"
-#include "odometry/rigid.h"
+#include "pose/rigid.h"
 #include "twoview/feature.h"
 
 namespace tv {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "geometry/vector3.h"
-#include "odometry/window.h"
+#include "adjust/window.h"
 
 namespace tv {
 namespace {

@@ -28,7 +28,7 @@ struct MapWindow {
   float* errors;                 // of each observation, in pixels, after the adjustment
   double* covariances;           // 36 of each view, or null
   int32_t max_iterations;        // of the adjustment
-  double damping;                // of its first step (odometry/window.h)
+  double damping;                // of its first step (adjust/window.h)
   tv_window_result result;
 };
 

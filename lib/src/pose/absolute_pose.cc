@@ -1,4 +1,4 @@
-#include "odometry/absolute_pose.h"
+#include "pose/absolute_pose.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,8 +7,8 @@
 #include "base/order.h"
 #include "base/random.h"
 #include "geometry/null_space.h"
-#include "odometry/absolute_pose_3pt.h"
-#include "odometry/reprojection.h"
+#include "pose/absolute_pose_3pt.h"
+#include "pose/reprojection.h"
 #include "robust/chance.h"
 #include "robust/gravity.h"
 #include "robust/ldlt.h"

@@ -4,7 +4,7 @@
 // test/property/test_absolute_pose_statistics.cc.
 #pragma once
 
-#include "odometry/sightings.h"
+#include "pose/sightings.h"
 #include "twoview/absolute_pose.h"
 
 namespace tv {

@@ -1,4 +1,4 @@
-#include "odometry/absolute_pose_3pt.h"
+#include "pose/absolute_pose_3pt.h"
 
 #include <cmath>
 #include <cstdint>

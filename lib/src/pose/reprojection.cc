@@ -1,4 +1,4 @@
-#include "odometry/reprojection.h"
+#include "pose/reprojection.h"
 
 #include <algorithm>
 #include <cmath>

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "geometry/vector3.h"
-#include "odometry/sightings.h"
+#include "pose/sightings.h"
 
 namespace tv {
 

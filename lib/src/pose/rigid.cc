@@ -1,4 +1,4 @@
-#include "odometry/rigid.h"
+#include "pose/rigid.h"
 
 #include <algorithm>
 #include <cmath>

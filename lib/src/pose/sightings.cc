@@ -1,4 +1,4 @@
-#include "odometry/sightings.h"
+#include "pose/sightings.h"
 
 #include <algorithm>
 #include <cmath>

@@ -9,7 +9,7 @@
 #include <limits>
 
 #include "base/math.h"
-#include "geometry/triangulation.h"
+#include "triangulation/triangulation.h"
 #include "geometry/vector3.h"
 #include "robust/bundle_point.h"
 #include "robust/ldlt.h"

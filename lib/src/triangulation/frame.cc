@@ -1,4 +1,4 @@
-#include "geometry/triangulation_frame.h"
+#include "triangulation/frame.h"
 
 namespace tv {
 namespace {

@@ -1,5 +1,5 @@
 // Test: test/unit/test_triangulation.cc, test_triangulation_opencv.cc.
-#include "geometry/triangulation_linear.h"
+#include "triangulation/linear.h"
 
 namespace tv {
 namespace {

@@ -1,8 +1,8 @@
 // The pair of cameras that all methods of triangulation work on, prepared once for all points by
-// prepare_triangulation (geometry/triangulation.h).
+// prepare_triangulation (triangulation/triangulation.h).
 #pragma once
 
-#include "geometry/triangulation_poly.h"
+#include "triangulation/poly.h"
 
 namespace tv {
 

@@ -1,5 +1,5 @@
 // Test: test/unit/test_triangulation_optimal.cc, test_triangulation_opencv.cc.
-#include "geometry/triangulation_poly.h"
+#include "triangulation/poly.h"
 
 namespace tv {
 namespace {

@@ -3,7 +3,7 @@
 // P. Sturm, "Triangulation", CVIU 68(2), 1997. Derivation: docs/algorithms/triangulation.md.
 #pragma once
 
-#include "geometry/triangulation_frame.h"
+#include "triangulation/frame.h"
 
 namespace tv {
 

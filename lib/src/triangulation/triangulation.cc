@@ -1,11 +1,11 @@
 // Triangulation on rays. Problem, derivation and valid range: docs/algorithms/triangulation.md;
 // test: test/unit/test_triangulation.cc, test_triangulation_opencv.cc.
-#include "geometry/triangulation.h"
+#include "triangulation/triangulation.h"
 
 #include <limits>
 
 #include "base/math.h"
-#include "geometry/triangulation_linear.h"
+#include "triangulation/linear.h"
 #include "kernels/kernels.h"
 #include "twoview/context.h"
 
