@@ -18,12 +18,13 @@ def _run(*command):
 
 
 def text_and_data(root, library):
-    """KiB of text and data as `size` counts them, and the limit."""
+    """KiB of text and data as `size` counts them, and the most that they may have grown to."""
     told = subprocess.run([os.path.join(root, "scripts", "footprint"), "--built", library],
                           # The exit status only says whether the size is above its limit.
                           capture_output=True, text=True).stdout
-    text, data, limit = re.search(r"text (\d+)  data (\d+) .* (\d+) KiB", told).groups()
-    return (int(text) + int(data)) / 1024, int(limit)
+    text, data = re.search(r"text (\d+)  data (\d+)", told).groups()
+    recorded = sum(map(int, re.findall(r"\(recorded (\d+)\)", told)))
+    return (int(text) + int(data)) / 1024, int(recorded * 1.03 / 1024)
 
 
 def closure(path):

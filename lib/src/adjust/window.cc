@@ -4,9 +4,9 @@
 #include <cmath>
 #include <cstring>
 
+#include "adjust/window_system.h"
 #include "base/math.h"
 #include "geometry/vector3.h"
-#include "adjust/window_system.h"
 
 namespace tv {
 namespace {
@@ -40,22 +40,29 @@ double error_sq_at(const Window& window, const WindowObservation& o, const doubl
 // Numbers the blocks of the views that are adjusted: those that take part and are not held.
 void choose_views(Window* window, tv_window_result* result) {
   const tv_window& given = window->given;
-  int32_t* block = window->block;  // here: 0 for a view that takes part
+  int32_t* block = window->block;
   std::fill(block, block + given.num_views, kAbsentView);
-  for (int k = 0; k < window->num_observations; ++k) block[window->observations[k].view] = 0;
-  for (int k = 0; k < given.num_pose_priors; ++k) block[given.pose_priors[k].idx_view] = 0;
-  for (int k = 0; k < given.num_gravity_priors; ++k) block[given.gravity_priors[k].idx_view] = 0;
+  for (int k = 0; k < window->num_observations; ++k)
+    block[window->observations[k].view] = kUnnumberedView;
+  for (int k = 0; k < given.num_pose_priors; ++k)
+    block[given.pose_priors[k].idx_view] = kUnnumberedView;
+  for (int k = 0; k < given.num_gravity_priors; ++k) {
+    block[given.gravity_priors[k].idx_view] = kUnnumberedView;
+  }
   for (int k = 0; k < given.num_distance_priors; ++k) {
-    block[given.distance_priors[k].idx_view0] = block[given.distance_priors[k].idx_view1] = 0;
+    block[given.distance_priors[k].idx_view0] = kUnnumberedView;
+    block[given.distance_priors[k].idx_view1] = kUnnumberedView;
   }
   int num_fixed = 0;
-  for (int v = 0; v < given.num_views; ++v) num_fixed += block[v] == 0 && given.views[v].fixed != 0;
+  for (int v = 0; v < given.num_views; ++v) {
+    num_fixed += block[v] == kUnnumberedView && given.views[v].fixed != 0;
+  }
   result->held_first_view =
       num_fixed == 0 && given.num_pose_priors == 0 && given.num_gravity_priors == 0;
   result->scale_is_free = given.num_distance_priors == 0 && num_fixed + given.num_pose_priors < 2;
   bool hold = result->held_first_view != 0;
   for (int v = 0; v < given.num_views; ++v) {
-    if (block[v] < 0) continue;
+    if (block[v] == kAbsentView) continue;
     block[v] = given.views[v].fixed != 0 || hold ? kHeldView : window->num_blocks++;
     hold = false;
   }
@@ -316,8 +323,7 @@ struct Gathering {
 };
 
 // The arrays of a window of which every view is adjusted.
-__attribute__((noinline)) Gathering take_arrays(const tvk_odometry_table* kernels, Arena& arena,
-                                                Window* window) {
+Gathering take_arrays(const tvk_odometry_table* kernels, Arena& arena, Window* window) {
   const tv_window& given = window->given;
   const size_t views = count_of(given.num_views), points = count_of(given.num_points);
   const size_t observations = count_of(given.num_observations);

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <cstdint>
 
-#include "geometry/vector3.h"
 #include "adjust/block_cholesky.h"
+#include "geometry/vector3.h"
 #include "twoview/window.h"
 
 namespace tv {

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cstring>
 
-#include "base/math.h"
 #include "adjust/window_system.h"
+#include "base/math.h"
 
 namespace tv {
 namespace {

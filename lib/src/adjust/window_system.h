@@ -3,10 +3,10 @@
 // docs/algorithms/window.md. Tests: test/unit/test_window.cc, test/unit/test_window_ceres.cc.
 #pragma once
 
-#include "geometry/vector3.h"
 #include "adjust/block_cholesky.h"
 #include "adjust/window_observation.h"
 #include "adjust/window_prior.h"
+#include "geometry/vector3.h"
 
 namespace tv {
 
@@ -27,7 +27,8 @@ struct WindowPoint {
   double cost, next_cost;  // its sum of rho
 };
 
-inline constexpr int32_t kHeldView = -1, kAbsentView = -2;
+// In place of the number of a view's block: its pose stays; nothing sees it; not numbered yet.
+inline constexpr int32_t kHeldView = -1, kAbsentView = -2, kUnnumberedView = -3;
 
 // The arrays are taken from an arena afterwards.
 struct Window {

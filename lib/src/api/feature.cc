@@ -88,9 +88,7 @@ Bytes bytes_of(const tv_keypoint* keypoints, int32_t count) {
 }
 
 // Whether an output shares a byte with the other array, the image, or the mask, which may be null.
-// Not inlined, for size.
-__attribute__((noinline)) bool overlaps_any(Bytes out, Bytes other, const tv_image* image,
-                                            const tv_image* mask) {
+bool overlaps_any(Bytes out, Bytes other, const tv_image* image, const tv_image* mask) {
   return overlap(out.data, out.size, other.data, other.size) ||
          overlap(out.data, out.size, image->data, image_bytes(*image)) ||
          (mask != nullptr && overlap(out.data, out.size, mask->data, image_bytes(*mask)));

@@ -14,12 +14,12 @@
 #include "api/within.h"
 #include "feature/tilts.h"
 #include "geometry/essential.h"
-#include "triangulation/triangulation.h"
 #include "image/pyramid.h"
 #include "match/align.h"
 #include "match/rank.h"
 #include "match/witness.h"
 #include "robust/verdict.h"
+#include "triangulation/triangulation.h"
 #include "twoview/bundle.h"
 
 namespace tv {

@@ -4,12 +4,12 @@
 
 #include <cmath>
 
+#include "adjust/window.h"
 #include "api/sized.h"
 #include "api/validate.h"
 #include "api/within.h"
 #include "geometry/essential.h"
 #include "geometry/vector3.h"
-#include "adjust/window.h"
 
 namespace tv {
 namespace {

@@ -1,7 +1,7 @@
 /* The kernel triangulate: points from the pixels of two pinhole cameras by Midpoint, Linear-LS or
-   Iterative-LS, TVK_LANES matches at a time. It computes what triangulation/triangulation.cc computes
-   for one match of any lens, in coordinates of the image planes z = 1. R. Hartley, P. Sturm,
-   "Triangulation", CVIU 68(2), 1997. docs/algorithms/triangulation.md. */
+   Iterative-LS, TVK_LANES matches at a time. It computes what triangulation/triangulation.cc
+   computes for one match of any lens, in coordinates of the image planes z = 1. R. Hartley, P.
+   Sturm, "Triangulation", CVIU 68(2), 1997. docs/algorithms/triangulation.md. */
 
 #include "kernels/lanes.h"
 #include "twoview/triangulate.h"

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "odometry/search.h"
 #include "pose/absolute_pose.h"
 #include "pose/reprojection.h"
-#include "odometry/search.h"
 
 namespace tv {
 namespace {

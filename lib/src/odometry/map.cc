@@ -271,8 +271,7 @@ void remove_lone_points(Map* map) {
   remove_marked_points(map);
 }
 
-// Not inlined: smaller.
-__attribute__((noinline)) bool is_upright(const Map& map, int32_t segment) {
+bool is_upright(const Map& map, int32_t segment) {
   for (int32_t k = 0; k < map.num_keyframes; ++k) {
     if (map.keyframes[k].segment == segment && map.keyframes[k].down_sigma_rad > 0) return true;
   }

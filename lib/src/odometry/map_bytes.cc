@@ -213,8 +213,8 @@ bool is_removed(const Header& h, const RemovedKeyframe& r) {
          r.id != r.kept_id && is_pose(r.kept_from_removed) && is_scale(r.scale);
 }
 
-// The given camera without the coefficients that its model ignores. Not inlined: smaller.
-__attribute__((noinline)) tv_camera camera_of(const Odometry& odometry) {
+// The given camera without the coefficients that its model ignores.
+tv_camera camera_of(const Odometry& odometry) {
   tv_camera camera = odometry.given_camera;
   if (camera.model == TV_CAMERA_PINHOLE) std::fill_n(camera.k, 8, 0.0);
   return camera;

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "geometry/vector3.h"
 #include "adjust/window.h"
+#include "geometry/vector3.h"
 
 namespace tv {
 namespace {
@@ -40,6 +40,7 @@ void take_arrays(const WindowSizes& sizes, int32_t max_points, Arena& arena, Map
   window->planes = arena_alloc<double>(arena, 2 * observations);
   window->gravity = arena_alloc<tv_gravity_prior>(arena, views);
   window->distances = arena_alloc<tv_distance_prior>(arena, views);
+  window->sines_sq = arena_alloc<float>(arena, points);
   window->errors = arena_alloc<float>(arena, observations);
 }
 
@@ -73,14 +74,11 @@ void add_observations_of(const Odometry& odometry, int32_t view, MapWindow* wind
 // Sets how uncertain the points' depths are from the largest angle between the rays to them.
 void measure_depths(const MapWindow& window, Odometry* odometry) {
   Map& map = odometry->map;
-  for (int32_t k = 0; k < window.model.num_points; ++k) {
-    MapPoint& point = map.points[window.places[k]];
-    point.depth_sigma = 0;  // holds the largest squared sine until the last loop below
-  }
+  std::fill_n(window.sines_sq, window.model.num_points, 0.0f);
   double centre[3];
   for (int32_t n = 0, view = -1; n < window.model.num_observations; ++n) {
     const tv_observation& o = window.observations[n];
-    MapPoint& point = map.points[window.places[o.idx_point]];
+    const MapPoint& point = map.points[window.places[o.idx_point]];
     if (o.idx_view != view) {
       view = o.idx_view;
       centre_of(map.keyframes[window.keyframes[view]].cam_from_world, centre);
@@ -93,13 +91,13 @@ void measure_depths(const MapWindow& window, Odometry* odometry) {
     cross(a, b, normal);
     const double sine_sq =
         length_sq_of(normal) / std::max(length_sq_of(a) * length_sq_of(b), 1e-300);
-    point.depth_sigma = std::max(point.depth_sigma, static_cast<float>(sine_sq));
+    float* largest = &window.sines_sq[o.idx_point];
+    *largest = std::max(*largest, static_cast<float>(sine_sq));
   }
   for (int32_t k = 0; k < window.model.num_points; ++k) {
-    MapPoint& point = map.points[window.places[k]];
-    const double sine = std::sqrt(static_cast<double>(point.depth_sigma));
+    const double sine = std::sqrt(static_cast<double>(window.sines_sq[k]));
     const double sigma = kTypicalNoise / (odometry->camera.model.fx * std::max(sine, 1e-6));
-    point.depth_sigma =
+    map.points[window.places[k]].depth_sigma =
         std::min(std::max(static_cast<float>(sigma), kLeastDepthSigma), kLargestDepthSigma);
   }
 }
@@ -121,7 +119,8 @@ void add_priors(const Odometry& odometry, int32_t view, MapWindow* window) {
     return;
   }
   const double way = length_of(own.way_m), sigma = kNoise * std::sqrt(own.way_variance);
-  const double way_here = way_between(own.cam_from_world, (&own)[-1].cam_from_world);
+  const double way_here =
+      way_between(own.cam_from_world, odometry.map.keyframes[k - 1].cam_from_world);
   if (!(way > sigma && std::fabs(way_here - way) < kLargestShare * way)) return;
   for (int32_t v = 0; v < model.num_views; ++v) {
     if (window->keyframes[v] != k - 1) continue;

@@ -25,6 +25,7 @@ struct MapWindow {
   double* planes;                // x, y on the plane z = 1 of each observation, or NaN
   tv_gravity_prior* gravity;     // room for one of each view
   tv_distance_prior* distances;  // as many
+  float* sines_sq;               // of each point, of the largest angle between its rays
   float* errors;                 // of each observation, in pixels, after the adjustment
   double* covariances;           // 36 of each view, or null
   int32_t max_iterations;        // of the adjustment

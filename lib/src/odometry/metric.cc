@@ -241,17 +241,14 @@ void add_travel(Odometry* odometry, const Frame& frame) {
   travel->bound_m += sigma;
 }
 
-// Not inlined, and neither is measure_reach, because the library is smaller so.
-__attribute__((noinline)) void begin_travel(Odometry* odometry, const Rigid& cam_from_world,
-                                            int32_t keyframe_id) {
+void begin_travel(Odometry* odometry, const Rigid& cam_from_world, int32_t keyframe_id) {
   odometry->travel = Travel{};
   odometry->travel.is_known = true;
   odometry->travel.keyframe_id = keyframe_id;
   centre_of(cam_from_world, odometry->travel.from);
 }
 
-__attribute__((noinline)) void measure_reach(const Odometry& odometry, const Frame& frame,
-                                             Reach* reach) {
+void measure_reach(const Odometry& odometry, const Frame& frame, Reach* reach) {
   Rigid attitude{};
   std::copy_n(frame.sensors.world_from_cam, 9, attitude.R);
   reach->axes = compose(attitude, frame.cam_from_world);

@@ -426,8 +426,7 @@ bool begin_segment(Odometry* odometry, Frame* frame, tv_odometry_state* state) {
   return true;
 }
 
-// Not inlined, and neither is clear_state, because the library is smaller so.
-__attribute__((noinline)) void write_counts(const Odometry& odometry, tv_odometry_state* state) {
+void write_counts(const Odometry& odometry, tv_odometry_state* state) {
   state->status = odometry.status;
   state->num_frames = odometry.num_frames;
   state->num_keyframes = odometry.map.num_keyframes;
@@ -454,7 +453,7 @@ __attribute__((noinline)) void write_counts(const Odometry& odometry, tv_odometr
 }
 
 // Makes *state that of a frame without a pose.
-__attribute__((noinline)) void clear_state(const Frame& frame, tv_odometry_state* state) {
+void clear_state(const Frame& frame, tv_odometry_state* state) {
   *state = tv_odometry_state{};
   state->num_keypoints = frame.num;
   state->segment = state->reference_id = -1;

@@ -256,8 +256,7 @@ struct Spread {
   Svd3 svd;
 };
 
-// noinline: it is called twice
-__attribute__((noinline)) Spread spread_of(const Finish& f, int count) {
+Spread spread_of(const Finish& f, int count) {
   Spread spread{};
   Mat3 sum = Mat3::Zero();
   for (int k = 0; k < count; ++k) {

@@ -9,8 +9,7 @@
 
 namespace tv {
 
-// Not inlined: smaller.
-__attribute__((noinline)) Rigid rigid_of(const double R[9], const double t[3]) {
+Rigid rigid_of(const double R[9], const double t[3]) {
   Rigid rigid;
   std::copy_n(R, 9, rigid.R);
   std::copy_n(t, 3, rigid.t);

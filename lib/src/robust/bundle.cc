@@ -9,11 +9,11 @@
 #include <limits>
 
 #include "base/math.h"
-#include "triangulation/triangulation.h"
 #include "geometry/vector3.h"
 #include "robust/bundle_point.h"
 #include "robust/ldlt.h"
 #include "robust/models.h"
+#include "triangulation/triangulation.h"
 
 namespace tv {
 namespace {

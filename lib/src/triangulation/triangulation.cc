@@ -5,8 +5,8 @@
 #include <limits>
 
 #include "base/math.h"
-#include "triangulation/linear.h"
 #include "kernels/kernels.h"
+#include "triangulation/linear.h"
 #include "twoview/context.h"
 
 namespace tv {

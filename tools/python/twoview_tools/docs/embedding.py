@@ -81,12 +81,11 @@ def code_table(printed):
     for cpu, part in _by_cpu(printed):
         cpus.append(cpu)
         whole = re.search(r"text (\d+)  data (\d+)", part)
-        parts = re.search(r"without the parts (\d+).*?odometry (\d+) .*?cloud (\d+) .*?room (\d+)",
-                          part, re.S)
+        parts = dict(re.findall(rf"^  {cpu}/(\w+) (\d+)", part, flags=re.M))
         stack = re.search(r"(\d+) bytes of stack at most", part)
-        values = {"two images: keypoints, matches, pose, points": parts[1],
-                  "odometry": parts[2], "the dense cloud and depth maps": parts[3],
-                  "the room": parts[4], "all": int(whole[1]) + int(whole[2])}
+        values = {"two images: keypoints, matches, pose, points": parts["rest"],
+                  "odometry": parts["odometry"], "the dense cloud and depth maps": parts["dense"],
+                  "the room": parts["room"], "all": int(whole[1]) + int(whole[2])}
         values["deepest stack"] = stack and stack[1]  # scripts/footprint --built LIBRARY has none
         for name, value in values.items():
             rows.setdefault(name, []).append(_grouped(int(value)) if value else "-")
