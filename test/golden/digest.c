@@ -627,7 +627,6 @@ static void digest_odometry(const pair *p, tv_context *context) {
                            TV_CONTEXT_ALIGNMENT;
   must("odometry_init", tv_odometry_init(&odometry, &camera, &options, memory, bytes));
   start();
-  add_int((int64_t)bytes);
   tv_odometry_frame_init(&frame);
   frame.image.data = pixels;
   frame.image.width = width;
@@ -985,13 +984,18 @@ static void digest_effort(const pair *p, const tv_limits *limits) {
   tv_context_free(context);
 }
 
-/* The context's size depends on the limits only, and the high water mark on the data only. */
+/* The sizes of a context and of an odometry depend on their limits only, and the high water mark on
+   the data only. */
 static void digest_memory(const pair *p, tv_context *context, const tv_limits *limits) {
+  tv_odometry_options options;
   size_t bytes = 0;
   start();
   must("size", tv_context_size(limits, &bytes));
   add_int((int64_t)bytes);
   add_int((int64_t)tv_context_high_water(context));
+  tv_odometry_options_init(&options);
+  must("odometry_size", tv_odometry_size(&p->camera[0], &options, &bytes));
+  add_int((int64_t)bytes);
   print(p, context, "memory");
 }
 
