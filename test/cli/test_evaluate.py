@@ -140,6 +140,16 @@ class Evaluate(cli.CliTest):
         self.assertGreater(report["auc"]["20"], 95)
         self.assertEqual(report["auc_signed"]["20"], 0)
 
+    def test_poses_of_the_other_direction_are_named(self):
+        backwards = list(SIDEWAYS)
+        backwards[3] = 1
+        poses = self.write("mine.txt", "a.png b.png 1 0 0 1 0 1 0 0 0 0 1 0\n")
+        own = b"most poses of mine fit the inverse"
+        listed = b"is its T_0to1 T_1to0?"
+        for T, is_own in ((SIDEWAYS, True), (backwards, False)):
+            done = self.succeed(self.evaluate(pair_line(T=T), "--poses", poses))
+            self.assertEqual((own in done.stdout, listed in done.stdout), (is_own, not is_own))
+
     def test_without_truth_the_errors_are_null(self):
         line = " ".join(pair_line().split()[:22]) + "\n"
         report = self.report(line)

@@ -462,8 +462,6 @@ class RoomTest(CliTest):
                 " ".join(f"{v:.9f}" for v in (t, *p, *rotation)) + "\n"
                 for t, p in zip(TIMES, places)))
 
-        right = file((x, y, z, w), places, "right.txt")
-        self.succeed(self.room("--poses", right, "--voxel", "0.2", folder=self.source))
         other = self.folder / "other"
         for words, rotation, at in (
                 ("quaternions with w first", (w, x, y, z), places),
