@@ -318,7 +318,7 @@ void LivePage::State::copy(const Flight& flight) {
   Snapshot made = snapshot_of(flight);
   const std::unique_lock<std::mutex> lock(mutex, std::try_to_lock);
   if (!lock.owns_lock()) return;
-  // Colours are told once, so those of a snapshot that was not written go on.
+  // Colours are copied once, so those of a snapshot that was not written go on.
   if (copied) made.colours.merge(copied->colours);
   copied = std::move(made);
   wakes.notify_one();
@@ -407,12 +407,17 @@ void LivePage::State::work() {
     const auto now = std::chrono::steady_clock::now();
     if (has_grown && now - written > kSurfacePeriod) {
       lock.unlock();
-      auto bytes = std::make_shared<const std::string>(preview.surface());
+      std::string bytes;
+      try {
+        bytes = preview.surface();
+      } catch (const std::exception&) {
+        is_whole = is_unsettled = false;
+      }
       has_grown = false;
       written = now;
       lock.lock();
-      if (!bytes->empty() && !has_final_surface) {
-        surface = bytes;
+      if (!bytes.empty() && !has_final_surface) {
+        surface = std::make_shared<const std::string>(std::move(bytes));
         surface_keyframes = preview.num_keyframes();
         ++surface_version;
       }
