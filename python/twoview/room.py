@@ -14,7 +14,7 @@ from .camera import Camera, camera_struct
 from .options import (RoomInferOptions, RoomMeshOptions, RoomOptions, RoomPlaneOptions,
                       to_struct)
 
-#: Memory in bytes that holds a furnished room of 8 x 6 x 3 m with voxels of 3 cm.
+#: Memory in bytes that holds a furnished room of 8 x 6 x 3 m with the default options.
 ROOM_DEFAULT_BYTES = 64 << 20
 
 

@@ -30,7 +30,7 @@ typedef struct tv_room tv_room;
 #define TV_ROOM_MAX_MAPS 2047
 /* The least memory of a room, in bytes. */
 #define TV_ROOM_MIN_BYTES 262144
-/* Memory in bytes that holds a furnished room of 8 x 6 x 3 m with voxels of 3 cm. */
+/* Memory in bytes that holds a furnished room of 8 x 6 x 3 m with the default options. */
 #define TV_ROOM_DEFAULT_BYTES 67108864
 
 /* Options of a room. Filled by tv_room_options_init. */
