@@ -459,7 +459,8 @@ def test_another_versions_database_is_refused(exported, photographs, tmp_path, r
                         "1\n", "5 fields"), ("a.png b.png x 0\n", "'x' is no number"),
     ("a.png b.png 0 nan\n", "not finite"), ("a.png a.png\n", "paired with itself"),
     ("a.png b.png 0 0 " + "1 0 0 0 1 0 0 0 2 " * 2 + "\n", "K0 is not"),
-    ("a.png b.png 0 0 " + "1 0 0 0 1 0 0 0 1 " * 2 + "1 " * 16 + "\n", "no rotation"),
+    ("a.png b.png 0 0 " + "500 0 9 0 500 9 0 0 1 " * 2 + "1 " * 16 + "\n", "no rotation"),
+    ("a.png b.png 0 0 " + "1 0 0 0 1 0 0 0 1 " * 2 + "\n", "K0 is normalised"),
     ("a.png missing.png\n", "no image missing.png in"),
     ("a.png b.png 0 0 "
      "" + "500 0 9 0 500 9 0 0 1 " * 2 + "\na.png c.png 0 0 " + "501 0 9 0 501 9 0 0 1 " * 2,
