@@ -151,7 +151,8 @@ class UnmeasurableTest(CliTest):
             self.assertAlmostEqual(v["z"], 5, delta=0.1)
             for channel in ("red", "green", "blue"):
                 self.assertAlmostEqual(v[channel], grey, delta=10)
-        # Where the memory is full, all is fused again with larger voxels, and the wall is carried on.
+        # Where the memory is full, all is fused again with larger voxels, and the wall is carried
+        # there, too.
         done = self.succeed(self.run_program("room", source, *poses, "--voxel", "0.05",
                                              "--max-memory", "1"))
         self.assertIn("voxels became 0.1 instead of 0.05", done.stdout.decode())

@@ -113,7 +113,8 @@ def results(scene):
         for effort in (0, 2):
             pose, cloud = tv.reconstruct(context, images[0], cameras[0], images[1], cameras[1],
                                          effort=effort)
-            yield f"reconstruct_effort_{effort}", [cloud.effort, len(cloud.points), *words_of_pose(pose)]
+            yield f"reconstruct_effort_{effort}", [cloud.effort, len(cloud.points),
+                                                   *words_of_pose(pose)]
     yield from flight_results(images[0], cameras[0])
 
 
