@@ -23,8 +23,8 @@ def text_and_data(root, library):
                           # The exit status only says whether the size is above its limit.
                           capture_output=True, text=True).stdout
     text, data = re.search(r"text (\d+)  data (\d+)", told).groups()
-    recorded = sum(map(int, re.findall(r"\(recorded (\d+)\)", told)))
-    return (int(text) + int(data)) / 1024, int(recorded * 1.03 / 1024)
+    most = sum(map(int, re.findall(r"\(at most (\d+)\)", told)))
+    return (int(text) + int(data)) / 1024, most // 1024
 
 
 def closure(path):

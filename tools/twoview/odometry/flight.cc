@@ -385,18 +385,33 @@ const Thumbnail* Flight::thumbnail(int number) const {
   return found == thumbnails_.end() ? nullptr : &found->second;
 }
 
-std::vector<FlightKeyframe> keyframes_of(const tv_odometry* odometry, int32_t max_keypoints) {
-  std::vector<FlightKeyframe> keyframes;
+namespace {
+
+std::vector<tv_map_observation> observations_of(const tv_odometry* odometry, int32_t idx,
+                                                int32_t max_keypoints) {
   std::vector<tv_map_observation> seen(static_cast<size_t>(max_keypoints));
+  int32_t count = 0;
+  check(tv_odometry_observations(odometry, idx, seen.data(), max_keypoints, &count),
+        "keyframe " + std::to_string(idx));
+  return {seen.begin(), seen.begin() + count};
+}
+
+// All keyframes, without what they see.
+std::vector<FlightKeyframe> poses_of(const tv_odometry* odometry) {
+  std::vector<FlightKeyframe> keyframes;
   FlightKeyframe key;
   tv_keyframe_init(&key.keyframe);
-  for (int32_t idx = 0; tv_odometry_keyframe(odometry, idx, &key.keyframe) == TV_OK; ++idx) {
-    int32_t count = 0;
-    check(tv_odometry_observations(odometry, idx, seen.data(), max_keypoints, &count),
-          "keyframe " + std::to_string(idx));
-    key.observations.assign(seen.begin(), seen.begin() + count);
+  for (int32_t idx = 0; tv_odometry_keyframe(odometry, idx, &key.keyframe) == TV_OK; ++idx)
     keyframes.push_back(key);
-  }
+  return keyframes;
+}
+
+}  // namespace
+
+std::vector<FlightKeyframe> keyframes_of(const tv_odometry* odometry, int32_t max_keypoints) {
+  std::vector<FlightKeyframe> keyframes = poses_of(odometry);
+  for (size_t k = 0; k < keyframes.size(); ++k)
+    keyframes[k].observations = observations_of(odometry, static_cast<int32_t>(k), max_keypoints);
   return keyframes;
 }
 
@@ -412,32 +427,25 @@ std::vector<FlightKeyframe> Flight::keyframes() const {
 }
 
 std::vector<FlightKeyframe> Flight::keyframe_poses() const {
-  std::vector<FlightKeyframe> keyframes;
-  if (!odometry_) return keyframes;
-  FlightKeyframe key;
-  tv_keyframe_init(&key.keyframe);
-  for (int32_t idx = 0; tv_odometry_keyframe(odometry_, idx, &key.keyframe) == TV_OK; ++idx)
-    keyframes.push_back(key);
-  return keyframes;
+  return odometry_ ? poses_of(odometry_) : std::vector<FlightKeyframe>();
 }
 
 std::vector<std::pair<tv_map_observation, Rgb>> Flight::coloured(int32_t idx) const {
+  FlightKeyframe key;
+  tv_keyframe_init(&key.keyframe);
+  check(tv_odometry_keyframe(odometry_, idx, &key.keyframe), "keyframe " + std::to_string(idx));
+  key.observations = observations_of(odometry_, idx, options_.odometry.max_keypoints);
+  return coloured(key);
+}
+
+std::vector<std::pair<tv_map_observation, Rgb>> Flight::coloured(const FlightKeyframe& key) const {
   std::vector<std::pair<tv_map_observation, Rgb>> found;
-  tv_keyframe key;
-  tv_keyframe_init(&key);
-  check(tv_odometry_keyframe(odometry_, idx, &key), "keyframe " + std::to_string(idx));
-  const auto kept = colours_.find(key.frame);
+  const auto kept = colours_.find(key.keyframe.frame);
   if (kept == colours_.end()) return found;
-  std::vector<tv_map_observation> seen(static_cast<size_t>(options_.odometry.max_keypoints));
-  int32_t count = 0;
-  check(tv_odometry_observations(odometry_, idx, seen.data(), options_.odometry.max_keypoints,
-                                 &count),
-        "keyframe " + std::to_string(idx));
-  seen.resize(static_cast<size_t>(count));
-  for (const tv_map_observation& one : seen) {
-    const auto keypoint = static_cast<size_t>(one.idx_keypoint);
-    if (one.idx_point >= 0 && keypoint < kept->second.size())
-      found.emplace_back(one, kept->second[keypoint]);
+  for (const tv_map_observation& seen : key.observations) {
+    const auto keypoint = static_cast<size_t>(seen.idx_keypoint);
+    if (seen.idx_point >= 0 && keypoint < kept->second.size())
+      found.emplace_back(seen, kept->second[keypoint]);
   }
   return found;
 }
@@ -466,15 +474,9 @@ std::vector<Rgb> greys_of(const std::vector<tv_map_point>& points) {
 std::vector<Rgb> Flight::colours(const std::vector<tv_map_point>& points,
                                  const std::vector<FlightKeyframe>& keyframes) const {
   std::vector<Rgb> colours = greys_of(points);
-  for (const FlightKeyframe& key : keyframes) {  // the newest comes last
-    const auto kept = colours_.find(key.keyframe.frame);
-    if (kept == colours_.end()) continue;
-    for (const tv_map_observation& seen : key.observations) {
-      const auto keypoint = static_cast<size_t>(seen.idx_keypoint);
-      if (seen.idx_point >= 0 && keypoint < kept->second.size())
-        colours[static_cast<size_t>(seen.idx_point)] = kept->second[keypoint];
-    }
-  }
+  for (const FlightKeyframe& key : keyframes)  // the newest comes last
+    for (const auto& [seen, rgb] : coloured(key))
+      colours[static_cast<size_t>(seen.idx_point)] = rgb;
   return colours;
 }
 

@@ -157,9 +157,10 @@ class Flight {
   // Without what they see.
   std::vector<FlightKeyframe> keyframe_poses() const;
   std::vector<tv_map_point> points() const;
-  // What the keyframe number idx of the map sees, whose colours are kept, with these: only points.
-  // Empty where the picture had none.
+  // The points that a keyframe of the map sees (by its number, or as keyframes() gives it), each
+  // with the colour of its pixel. Empty where the picture had none.
   std::vector<std::pair<tv_map_observation, Rgb>> coloured(int32_t idx) const;
+  std::vector<std::pair<tv_map_observation, Rgb>> coloured(const FlightKeyframe& key) const;
   // For each of these points of the map the colour of its pixel in the newest of these keyframes
   // that sees it and whose picture had colours; else its grey level.
   std::vector<Rgb> colours(const std::vector<tv_map_point>& points,
