@@ -302,6 +302,24 @@ class Surfaces(unittest.TestCase):
                 file.write(header.format("ascii 1.0") + "1 2 3 4\n5 6 7 8\n")
             self.assertEqual(ply.read_ply(path)["red"].tolist(), [4, 8])
 
+    def test_a_mesh_is_read_whole_or_not_at_all(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "room.ply")
+            vertices = np.arange(9, dtype="<f4").reshape(3, 3)
+            whole = (b"ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\n"
+                     b"property float y\nproperty float z\nelement face 2\n"
+                     b"property list uchar int vertex_indices\nend_header\n" + vertices.tobytes() +
+                     b"".join(b"\3" + np.array(t, "<i4").tobytes() for t in ((0, 1, 2), (2, 1, 0))))
+            with open(path, "wb") as file:
+                file.write(whole)
+            read, triangles = ply.read_mesh(path)
+            self.assertEqual(read["y"].tolist(), [1, 4, 7])
+            self.assertEqual(triangles.tolist(), [[0, 1, 2], [2, 1, 0]])
+            with open(path, "wb") as file:
+                file.write(whole[:-1])
+            with self.assertRaisesRegex(ValueError, "not 2 triangles"):
+                ply.read_mesh(path)
+
 
 class Readers(unittest.TestCase):
     def setUp(self):

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 import twoview as tv
 
+from .. import ply
 from ..odometry import sets
 from . import flight, truth
 
@@ -46,23 +47,6 @@ def room_without(program, out, folder, times):
     run = subprocess.run([program, "room", rest, "-o", os.path.join(folder, "room"), "--quiet"],
                          check=False)
     return run.returncode == 0
-
-
-def read_mesh(path):
-    """(vertices, triangles) of a room.ply."""
-    with open(path, "rb") as file:
-        lines = []
-        while not lines or lines[-1] != "end_header":
-            lines.append(file.readline().decode("ascii").strip())
-        counts = {line.split()[1]: int(line.split()[2]) for line in lines
-                  if line.startswith("element ")}
-        types = {"float": "<f4", "uchar": "u1"}
-        vertex = np.dtype([(line.split()[2], types[line.split()[1]]) for line in lines
-                           if line.startswith("property ") and line.split()[1] in types])
-        face = np.dtype([("count", "u1"), ("corners", "<i4", 3)])
-        vertices = np.frombuffer(file.read(counts["vertex"] * vertex.itemsize), vertex)
-        faces = np.frombuffer(file.read(counts["face"] * face.itemsize), face)
-    return vertices, faces["corners"]
 
 
 class Renderer:
@@ -166,6 +150,6 @@ def measure(program, folder, work):
         return None
     with open(os.path.join(work, "room", "result.json"), encoding="utf-8") as file:
         room = json.load(file)["room"]
-    mesh = read_mesh(os.path.join(work, "room", "room.ply"))
+    mesh = ply.read_mesh(os.path.join(work, "room", "room.ply"))
     return {**scores(source, hidden, mesh, folder), "keyframes": room["keyframes_used"],
             "vertices": len(mesh[0])}

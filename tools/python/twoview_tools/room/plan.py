@@ -102,7 +102,7 @@ def scores(result, boxes, seen, world):
     lines, sides = lines_of(result, world), sides_of(boxes)
     row = {"lines": len(lines), "false": 0, "twice": 0, "walls": 0, "walls_found": 0,
            "fronts": 0, "fronts_found": 0}
-    offsets, explained = [], {}
+    offsets, explained = [], set()
     for ends, normal, _ in sorted(lines, key=lambda line: -np.linalg.norm(line[0][1] - line[0][0])):
         points = points_along(ends)
         away = np.array([offsets_from(points, normal, side) for side in sides])
@@ -117,7 +117,7 @@ def scores(result, boxes, seen, world):
                  for k, p in zip(nearest, points[right])}
         again = sum(any((k, c + d) in explained for d in (-1, 0, 1)) for k, c in cells)
         row["twice"] += again > 0.5 * len(cells)
-        explained.update(dict.fromkeys(cells, True))
+        explained |= cells
     for side, (feet, area) in zip(sides, seen_parts(sides, seen)):
         if not len(feet) or (area < LEAST_AREA and not side["is_wall"]):
             continue
