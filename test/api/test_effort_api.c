@@ -394,7 +394,7 @@ static void test_a_later_trial_is_believed_less(void) {
   TEST_ASSERT_TRUE(two_view.probability_wrong == first);
   estimate.num_trials = 3;
   run(0, 0);
-  if (two_view.probability_wrong != 0.5) { /* which doubt() may raise it to */
+  if (two_view.probability_wrong != 0.5) { /* which descriptors may raise it to */
     const double odds = first / (1 - first), later = two_view.probability_wrong;
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 3 * odds, later / (1 - later));
   }

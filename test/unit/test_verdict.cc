@@ -10,6 +10,7 @@
 
 namespace {
 
+using tv::AbsoluteEvidence;
 using tv::Evidence;
 using tv::judge;
 
@@ -252,29 +253,113 @@ void test_an_uncalibrated_pair_is_judged_by_its_inliers_alone(void) {
   assert_reason(TV_REASON_LOW_INLIER_RATIO, e);
 }
 
-void test_after_guided_matching_the_first_verdict_stays(void) {
+// What descriptors are evidence for is judged with the rest, in one judgement.
+void test_descriptors_are_evidence_like_the_rest(void) {
+  const double probability = judge(good()).probability_wrong;
+  TEST_ASSERT_TRUE(probability < 0.1);
+  Evidence repeated = good(), mirrored = good();
+  repeated.looks_repeated = mirrored.looks_mirrored = true;
+  assert_reason(TV_REASON_REPEATED_STRUCTURE, repeated);
+  assert_reason(TV_REASON_LOW_INLIER_RATIO, mirrored);
+  TEST_ASSERT_EQUAL_DOUBLE(0.5, judge(repeated).probability_wrong);
+  TEST_ASSERT_EQUAL_DOUBLE(0.5, judge(mirrored).probability_wrong);
+  // Beside a second model, and where the pose is more probably wrong by itself.
+  repeated.has_second_model = true;
+  assert_reason(TV_REASON_SECOND_MOTION | TV_REASON_REPEATED_STRUCTURE, repeated);
+  mirrored.agreement = 0.01;
+  mirrored.noise_px = 0.69;
+  mirrored.num_places[0] = mirrored.num_places[1] = 2;
+  TEST_ASSERT_TRUE(judge(mirrored).probability_wrong > 0.5);
+  // A pair that is refused has its kind as its reason.
+  for (const tv_kind kind : {TV_KIND_PANORAMIC, TV_KIND_NO_MOTION, TV_KIND_DEGENERATE}) {
+    Evidence e = good(), seen = good();
+    e.kind = seen.kind = kind;
+    seen.looks_repeated = seen.looks_mirrored = true;
+    TEST_ASSERT_EQUAL_INT(TV_VERDICT_REFUSED, judge(seen).verdict);
+    TEST_ASSERT_EQUAL_HEX32(judge(e).reasons, judge(seen).reasons);
+  }
+}
+
+AbsoluteEvidence good_absolute() {
+  AbsoluteEvidence e;
+  e.has_pose = true;
+  e.threshold_px = 4;
+  e.num_matches = 120;
+  e.num_different = 100;
+  e.num_inliers = 80;
+  e.num_different_inliers = 70;
+  e.coverage = 0.5;
+  e.width_px = 100;
+  e.noise_px = 1;
+  e.sigma_rad = 0.005;
+  return e;
+}
+
+void assert_absolute(uint32_t reasons, const AbsoluteEvidence& e) {
+  const tv::Judgement judgement = judge(e);
+  TEST_ASSERT_EQUAL_HEX32(reasons, judgement.reasons);
+  TEST_ASSERT_EQUAL_INT(!e.has_pose    ? TV_VERDICT_REFUSED
+                        : reasons == 0 ? TV_VERDICT_OK
+                                       : TV_VERDICT_DOUBTFUL,
+                        judgement.verdict);
+}
+
+void test_an_absolute_pose_is_judged_by_the_same_rules(void) {
+  assert_absolute(0, good_absolute());
+  AbsoluteEvidence e = good_absolute();
+  e.num_different_inliers = 14;
+  assert_absolute(TV_REASON_TOO_FEW_MATCHES, e);
+  e = good_absolute();
+  e.num_inliers = 29;
+  assert_absolute(TV_REASON_LOW_INLIER_RATIO, e);
+  e.num_inliers = 30;
+  e.noise_px = 2.81;
+  assert_absolute(TV_REASON_LOW_INLIER_RATIO, e);
+  e.noise_px = 2.79;
+  e.sigma_rad = 0.0219;
+  assert_absolute(TV_REASON_LOW_PARALLAX, e);
+  e.sigma_rad = tv::kUnknown;
+  assert_absolute(TV_REASON_LOW_PARALLAX, e);
+  e.sigma_rad = 0.0218;
+  assert_absolute(0, e);
+  e.coverage = 4 / 64.0;
+  assert_absolute(TV_REASON_CROWDED_MATCHES, e);
+  e.coverage = 5 / 64.0;
+  e.width_px = 11.9;
+  assert_absolute(TV_REASON_CROWDED_MATCHES, e);
+  e.width_px = 12.1;
+  e.has_alternative = true;
+  assert_absolute(TV_REASON_TWO_PLANAR_SOLUTIONS, e);
+}
+
+void test_without_an_absolute_pose_there_is_one_reason(void) {
+  AbsoluteEvidence e;
+  e.num_different = 14;
+  e.is_on_line = true;
+  assert_absolute(TV_REASON_TOO_FEW_MATCHES, e);
+  e.num_different = 15;
+  assert_absolute(TV_REASON_CROWDED_MATCHES, e);
+  e.is_on_line = false;
+  assert_absolute(TV_REASON_LOW_INLIER_RATIO, e);
+}
+
+void test_after_guided_matching_the_first_measures_stay(void) {
   tv_two_view first{}, again{};
   first.has_R = first.has_t = again.has_R = again.has_t = 1;
   first.kind = again.kind = TV_KIND_CALIBRATED;
   first.num_inliers = again.num_inliers = 50;
-  first.verdict = TV_VERDICT_DOUBTFUL;
-  first.reasons = TV_REASON_CROWDED_MATCHES;
-  again.verdict = TV_VERDICT_OK;
-  first.probability_wrong = 0.25;
+  const tv_verdict doubtful = TV_VERDICT_DOUBTFUL;
   first.num_places = 30;
-  again.probability_wrong = 0.01;
-  TEST_ASSERT_TRUE(tv::takes_guided_estimate(first, &again));
-  TEST_ASSERT_EQUAL_INT(TV_VERDICT_DOUBTFUL, again.verdict);
-  TEST_ASSERT_TRUE(again.probability_wrong == 0.25 && again.num_places == 30);
-  TEST_ASSERT_EQUAL_HEX32(TV_REASON_CROWDED_MATCHES, again.reasons);
+  first.camera_chi2 = 7;
+  TEST_ASSERT_TRUE(tv::takes_guided_estimate(first, doubtful, TV_VERDICT_OK, &again));
+  TEST_ASSERT_TRUE(again.num_places == 30 && again.camera_chi2 == 7);
+  TEST_ASSERT_TRUE(tv::takes_guided_estimate(first, doubtful, doubtful, &again));
+  TEST_ASSERT_FALSE(tv::takes_guided_estimate(first, TV_VERDICT_OK, doubtful, &again));
   again.num_inliers = 49;
-  TEST_ASSERT_FALSE(tv::takes_guided_estimate(first, &again));
+  TEST_ASSERT_FALSE(tv::takes_guided_estimate(first, doubtful, doubtful, &again));
   again.num_inliers = 50;
   again.kind = TV_KIND_PLANAR;
-  TEST_ASSERT_FALSE(tv::takes_guided_estimate(first, &again));
-  again.kind = TV_KIND_CALIBRATED;
-  again.verdict = TV_VERDICT_REFUSED;
-  TEST_ASSERT_FALSE(tv::takes_guided_estimate(first, &again));
+  TEST_ASSERT_FALSE(tv::takes_guided_estimate(first, doubtful, doubtful, &again));
 }
 
 }  // namespace
@@ -296,6 +381,9 @@ int main(void) {
   RUN_TEST(test_views_that_change_places_give_the_same_bits);
   RUN_TEST(test_no_evidence_gives_a_probability);
   RUN_TEST(test_an_uncalibrated_pair_is_judged_by_its_inliers_alone);
-  RUN_TEST(test_after_guided_matching_the_first_verdict_stays);
+  RUN_TEST(test_descriptors_are_evidence_like_the_rest);
+  RUN_TEST(test_an_absolute_pose_is_judged_by_the_same_rules);
+  RUN_TEST(test_without_an_absolute_pose_there_is_one_reason);
+  RUN_TEST(test_after_guided_matching_the_first_measures_stay);
   return UNITY_END();
 }

@@ -10,6 +10,7 @@
 #include "api/extract.h"
 #include "api/scratch.h"
 #include "api/sized.h"
+#include "api/two_view.h"
 #include "api/validate.h"
 #include "api/within.h"
 #include "feature/tilts.h"
@@ -134,7 +135,9 @@ struct Attempt {
   int32_t num_keypoints[2];
   int32_t num_found;  // matches of tv_match
   int32_t num_matches, num_left_out;
-  tv_two_view estimate;
+  tv_two_view estimate;  // without its judgement, which is written with the results
+  Evidence evidence;     // of the latest estimate
+  Judgement judgement;   // of the rung
 };
 
 // Moves the keypoints of the matches by the pixels around them. A keypoint has at most one match.
@@ -263,15 +266,16 @@ __attribute__((noinline)) tv_status match_guided(tv_context* context,
                          &features[1], nullptr, r.more_matches, context->most_keypoints, count);
 }
 
-// Matches again along the epipolar lines of `estimate`, and estimates from all matches. If
-// takes_guided_estimate accepts the second estimate, *num_matches, *num_left_out, *estimate and r's
-// matches, pixels and mask become those of the second pass; else they stay. Not inlined, like the
+// Matches again along the epipolar lines of the attempt's estimate, and estimates from all matches.
+// If takes_guided_estimate accepts the second estimate, *num_matches, *num_left_out, the estimate
+// and r's matches, pixels and mask become those of the second pass; else they stay. So does the
+// attempt's judgement. Not inlined, like the
 // two stages below, so that its stack frame is not in use during the first estimate.
 __attribute__((noinline)) tv_status match_along_lines(tv_context* context, const Task& task,
-                                                      const Attempt& attempt, Results& r,
-                                                      int32_t* num_matches, int32_t* num_left_out,
-                                                      tv_two_view* estimate) {
+                                                      Attempt& attempt, Results& r,
+                                                      int32_t* num_matches, int32_t* num_left_out) {
   const tv_limits& limits = context->limits;
+  tv_two_view* const estimate = &attempt.estimate;
   int32_t count = 0;
   tv_status status = match_guided(context, attempt.num_keypoints, *estimate, r, &count);
   if (status != TV_OK) return status;
@@ -284,10 +288,12 @@ __attribute__((noinline)) tv_status match_along_lines(tv_context* context, const
   const int32_t left_out = keep_best(r.more_matches, limits.max_matches, &count);
   gather_pixels(r, r.more_matches, count);
   tv_two_view again = *estimate;
-  status = tv_estimate_two_view(context, task.views[0].camera, task.views[1].camera, &r.pairs,
-                                &task.estimate, &again, r.more_inlier_mask);
+  attempt.evidence = Evidence{};
+  status = estimate_two_view(context, task.views[0].camera, task.views[1].camera, &r.pairs,
+                             &task.estimate, &again, r.more_inlier_mask, &attempt.evidence);
   if (status != TV_OK) return status;
-  if (!takes_guided_estimate(*estimate, &again)) {
+  if (!takes_guided_estimate(*estimate, attempt.judgement.verdict, judge(attempt.evidence).verdict,
+                             &again)) {
     gather_pixels(r, r.matches, *num_matches);
     return TV_OK;
   }
@@ -487,7 +493,20 @@ bool looks_repeated(const tv_match_options* options, const Results& r, int32_t n
   return 2 * alike > inliers;
 }
 
-// Runs the rung that *attempt names, up to the estimate, in which the stack is deepest.
+// Adds what the descriptors are evidence for, and judges the attempt.
+void judge_attempt(tv_context* context, const Task& task, Results& r, Attempt* attempt) {
+  Evidence& evidence = attempt->evidence;
+  const int32_t num_keypoints = std::min(attempt->num_keypoints[0], attempt->num_keypoints[1]);
+  evidence.looks_repeated = looks_repeated(task.options.match, r, attempt->num_matches);
+  // To match mirrored pictures takes time, and where something is against the pair already, it adds
+  // nothing. Where a quarter of the keypoints match, the pictures are not mirrored.
+  evidence.looks_mirrored = 4 * attempt->num_matches < num_keypoints &&
+                            judge(evidence).verdict == TV_VERDICT_OK &&
+                            looks_mirrored(context, *attempt, task.options.match, r);
+  attempt->judgement = judge(evidence);
+}
+
+// Runs the rung that *attempt names. The stack is deepest in the estimate.
 tv_status run_rung(tv_context* context, const Task& task, Results& r, Attempt* attempt) {
   std::memset(r.aligned, 0, static_cast<size_t>(context->most_keypoints));
   tv_status status = extract_and_match(context, task, r, attempt);
@@ -503,20 +522,12 @@ tv_status run_rung(tv_context* context, const Task& task, Results& r, Attempt* a
   gather_pixels(r, r.matches, attempt->num_matches);
   tv_two_view& estimate = attempt->estimate;
   tv_two_view_init(&estimate);
-  status = tv_estimate_two_view(context, task.views[0].camera, task.views[1].camera, &r.pairs,
-                                &task.estimate, &estimate, r.inlier_mask);
+  attempt->evidence = Evidence{};
+  status = estimate_two_view(context, task.views[0].camera, task.views[1].camera, &r.pairs,
+                             &task.estimate, &estimate, r.inlier_mask, &attempt->evidence);
   if (status != TV_OK) return status;
   correct_cameras(estimate, task.views[0], task.views[1], r);
-  if (estimate.verdict != TV_VERDICT_REFUSED &&
-      looks_repeated(task.options.match, r, attempt->num_matches)) {
-    doubt(TV_REASON_REPEATED_STRUCTURE, &estimate);
-  }
-  // Where a quarter of the keypoints match, the pictures are not mirrored.
-  if (estimate.verdict == TV_VERDICT_OK &&
-      4 * attempt->num_matches < std::min(attempt->num_keypoints[0], attempt->num_keypoints[1]) &&
-      looks_mirrored(context, *attempt, task.options.match, r)) {
-    doubt(TV_REASON_LOW_INLIER_RATIO, &estimate);
-  }
+  judge_attempt(context, task, r, attempt);
   return TV_OK;
 }
 
@@ -532,7 +543,9 @@ int32_t num_certain(const Results& r, int32_t num_matches) {
 // the measurements.
 bool could_help(const Results& r, const Attempt& attempt) {
   const tv_two_view& e = attempt.estimate;
-  if (e.verdict == TV_VERDICT_OK || e.kind == TV_KIND_NO_MOTION || e.kind == TV_KIND_PANORAMIC) {
+  const Judgement& judgement = attempt.judgement;
+  if (judgement.verdict == TV_VERDICT_OK || e.kind == TV_KIND_NO_MOTION ||
+      e.kind == TV_KIND_PANORAMIC) {
     return false;
   }
   // A blank picture has nothing to match in any view.
@@ -547,7 +560,7 @@ bool could_help(const Results& r, const Attempt& attempt) {
   // What a pose lacks by the cameras alone, in enough places, no view gives.
   constexpr uint32_t kOfCameras = TV_REASON_LOW_PARALLAX | TV_REASON_CAMERA_CONTRADICTED;
   constexpr int32_t kEnoughPlaces = 20;
-  return (e.reasons & ~kOfCameras) != 0 || e.num_places < kEnoughPlaces;
+  return (judgement.reasons & ~kOfCameras) != 0 || e.num_places < kEnoughPlaces;
 }
 
 // The rung to climb to after an attempt at `rung`. Rung 1 takes longer than rung 2 and finds less;
@@ -641,8 +654,7 @@ tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_vie
   int32_t num_matches = attempt.num_matches, num_left_out = attempt.num_left_out, num_points = 0;
   tv_two_view& estimate = attempt.estimate;
   if (checked.guided_matching != 0 && tv::is_full_pose(estimate) && estimate.has_E != 0) {
-    status =
-        tv::match_along_lines(context, task, attempt, r, &num_matches, &num_left_out, &estimate);
+    status = tv::match_along_lines(context, task, attempt, r, &num_matches, &num_left_out);
     if (status != TV_OK) return status;
   }
   status = tv::triangulate_inliers(context, static_cast<tv_triangulation>(checked.triangulation),
@@ -652,6 +664,7 @@ tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_vie
     status = tv::adjust(context, num_matches, r, &estimate, &num_points);
     if (status != TV_OK) return status;
   }
+  tv::write_judgement(attempt.judgement, &estimate);
   tv::write_sized(estimate, two_view);
   tv::write_reconstruction(r, attempt, num_matches, num_left_out, num_points, num_rungs, rung_ns,
                            reconstruction);

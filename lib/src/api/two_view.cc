@@ -1,6 +1,7 @@
 // The entry points of two-view estimation: they validate, choose the canonical order of the views,
-// run the search and the finish, and write the result in the caller's order.
-#include "twoview/two_view.h"
+// run the search and the finish, and write the result in the caller's order, with the judgement of
+// robust/verdict.h.
+#include "api/two_view.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -182,28 +183,25 @@ __attribute__((noinline)) void pack(const TwoViewProblem& problem, const Matches
                                     bool swapped, int num_still, tv_two_view* result) {
   tv_two_view packed{};
   packed.num_still = num_still;
-  packed.kind = outcome.evidence.kind;
-  packed.verdict = outcome.judgement.verdict;
-  packed.reasons = outcome.judgement.reasons;
-  packed.probability_wrong = outcome.judgement.probability_wrong;
-  packed.agreement = outcome.evidence.agreement;
-  if (outcome.has_t) packed.region_shift_rad = outcome.evidence.region_shift_rad;
-  packed.num_places = std::min(outcome.evidence.num_places[0], outcome.evidence.num_places[1]);
+  packed.kind = outcome.evidence->kind;
+  packed.agreement = outcome.evidence->agreement;
+  if (outcome.has_t) packed.region_shift_rad = outcome.evidence->region_shift_rad;
+  packed.num_places = std::min(outcome.evidence->num_places[0], outcome.evidence->num_places[1]);
   packed.num_matches = problem.num;
-  packed.num_inliers = outcome.evidence.num_inliers;
+  packed.num_inliers = outcome.evidence->num_inliers;
   packed.num_iterations = model.num_iterations;
   packed.seed = problem.options.seed;
   packed.essential_inliers = outcome.essential_inliers;
   packed.fundamental_inliers = outcome.fundamental_inliers;
   packed.homography_inliers = outcome.homography_inliers;
   packed.rotation_inliers = outcome.rotation_inliers;
-  packed.median_parallax_rad = outcome.evidence.median_parallax_rad;
+  packed.median_parallax_rad = outcome.evidence->median_parallax_rad;
   packed.rms_error_px = outcome.rms_error_px;
-  packed.noise_px = outcome.evidence.noise_px;
+  packed.noise_px = outcome.evidence->noise_px;
   for (int k = 0; k < 2; ++k) {
     packed.principal_point_shift[k] = outcome.principal_point_shift_px[k];
   }
-  if (outcome.evidence.kind == TV_KIND_CALIBRATED) {
+  if (outcome.evidence->kind == TV_KIND_CALIBRATED) {
     const PrincipalPointTest& test = outcome.principal_point_test;
     packed.principal_point_chi2 = test.chi2;
     std::memcpy(packed.principal_point_asked_px, test.asked_px, sizeof test.asked_px);
@@ -214,7 +212,7 @@ __attribute__((noinline)) void pack(const TwoViewProblem& problem, const Matches
     packed.camera_turn_rad = outcome.misfit.turn_rad;
     packed.camera_direction_rad = outcome.misfit.direction_rad;
   }
-  packed.coverage = coverage_of(outcome.evidence);
+  packed.coverage = coverage_of(*outcome.evidence);
   packed.focal_scale = outcome.focal_scale;
   packed.focal_sigma = outcome.focal_sigma;
   if (outcome.has_covariance && !problem.one_camera) {
@@ -236,7 +234,7 @@ __attribute__((noinline)) void pack(const TwoViewProblem& problem, const Matches
     if (outcome.has_covariance) {
       pack_covariance(pose, inverse, outcome.covariance, swapped, packed.covariance);
     }
-    if (outcome.evidence.has_alternative) {
+    if (outcome.evidence->has_alternative) {
       const Pose other = swapped ? inverse_pose(outcome.alternative) : outcome.alternative;
       packed.has_alternative = 1;
       store(other.R, packed.alternative_R);
@@ -248,7 +246,7 @@ __attribute__((noinline)) void pack(const TwoViewProblem& problem, const Matches
       }
     }
   }
-  if (outcome.has_t || outcome.evidence.kind == TV_KIND_UNCALIBRATED) {
+  if (outcome.has_t || outcome.evidence->kind == TV_KIND_UNCALIBRATED) {
     const Mat3 F = (inverse1.transpose() * outcome.epipolar.M * inverse0).normalized();
     packed.has_F = 1;
     store(swapped ? Mat3(F.transpose()) : F, packed.F);
@@ -309,7 +307,10 @@ bool estimate_without_still(tv_context* context, const tv_camera* const cameras[
   // In place, since each temporary would lie on the stack, too.
   new (matches) Matches{};
   new (model) TwoViewModel{};
+  Evidence* const evidence = outcome->evidence;
+  *evidence = Evidence{};
   new (outcome) TwoViewOutcome{};
+  outcome->evidence = evidence;
   *num_still = 0;
   return false;
 }
@@ -337,6 +338,92 @@ __attribute__((noinline)) bool arrays_overlap(const tv_pixel_pairs& given,
 }
 
 }  // namespace
+
+tv_status estimate_two_view(tv_context* context, const tv_camera* camera0, const tv_camera* camera1,
+                            const tv_pixel_pairs* pairs, const tv_estimate_options* options,
+                            tv_two_view* result, uint8_t* inlier_mask, Evidence* evidence) {
+  if (context == nullptr || result == nullptr) return TV_ERR_NULL;
+  tv_pixel_pairs given;
+  tv_status status = read_pixel_pairs(pairs, &given);
+  if (status == TV_OK) status = check_sized(result);
+  if (status != TV_OK) return status;
+  const double *const pixels0 = given.pixels0, *const pixels1 = given.pixels1;
+  const float* const ratios = given.ratios;
+  const int32_t num_matches = given.num;
+  if ((camera0 == nullptr) != (camera1 == nullptr)) return TV_ERR_ARGUMENT;
+  const bool calibrated = camera0 != nullptr;
+  TwoViewProblem problem{};
+  status = read_estimate_options(options, calibrated, &problem.options);
+  if (status != TV_OK) return status;
+  if (num_matches > context->limits.max_matches || !made_for(*context, TV_PURPOSE_ESTIMATE)) {
+    return TV_ERR_LIMITS;
+  }
+  if (calibrated) {
+    status = tv_camera_check(camera0);
+    if (status == TV_OK) status = tv_camera_check(camera1);
+    if (status != TV_OK) return status;
+  }
+  if (arrays_overlap(given, pairs, options, camera0, camera1, result, inlier_mask)) {
+    return TV_ERR_OVERLAP;
+  }
+  ArenaScope scope(context->arena);
+  Matches matches{};
+  TwoViewModel model{};
+  const tv_camera* cameras[2] = {camera0, camera1};
+  bool swapped;
+  {
+    StageTimer timer(context, TV_STAGE_ESTIMATE);
+    problem.pixels[0] = pixels0;
+    problem.pixels[1] = pixels1;
+    problem.ratios = ratios;
+    problem.sigmas[0] = given.sigmas0;
+    problem.sigmas[1] = given.sigmas1;
+    problem.num = num_matches;
+    swapped = exchanged(camera0, camera1, problem);
+    problem.calibrated = calibrated;
+    problem.one_camera = calibrated && std::memcmp(camera0, camera1, sizeof *camera0) == 0;
+    tv_estimate_options& o = problem.options;
+    if (problem.one_camera) {
+      o.focal_sigma0 = o.focal_sigma1 =
+          o.focal_sigma0 > o.focal_sigma1 ? o.focal_sigma0 : o.focal_sigma1;
+      o.center_sigma0 = o.center_sigma1 =
+          o.center_sigma0 > o.center_sigma1 ? o.center_sigma0 : o.center_sigma1;
+    }
+    if (swapped) std::swap(cameras[0], cameras[1]);
+    if (calibrated) {
+      take_cameras(cameras, problem);
+    }
+    if (swapped) {
+      std::swap(problem.pixels[0], problem.pixels[1]);
+      std::swap(problem.sigmas[0], problem.sigmas[1]);
+      std::swap(o.gravity0, o.gravity1);
+      std::swap(o.focal_sigma0, o.focal_sigma1);
+      std::swap(o.center_sigma0, o.center_sigma1);
+    }
+    problem.kernels = tvk_geometry_of(context->kernels);
+  }
+  TwoViewOutcome outcome{};
+  outcome.evidence = evidence;
+  int num_still = 0;
+  if (!estimate_without_still(context, cameras, problem, &matches, &model, &outcome, &num_still)) {
+    estimate(context, problem, &matches, &model, &outcome);
+  }
+  pack(problem, matches, model, outcome, swapped, num_still, result);
+  if (inlier_mask != nullptr) {
+    std::memset(inlier_mask, 0, static_cast<size_t>(num_matches));
+    for (int k = 0; k < matches.num_all; ++k) inlier_mask[matches.order[k]] = outcome.inlier[k];
+  }
+  return TV_OK;
+}
+
+void write_judgement(const Judgement& judgement, tv_two_view* result) {
+  const int32_t verdict = judgement.verdict;
+  const double wrong = judgement.probability_wrong;
+  write_part(&verdict, sizeof verdict, offsetof(tv_two_view, verdict), result);
+  write_part(&judgement.reasons, sizeof judgement.reasons, offsetof(tv_two_view, reasons), result);
+  write_part(&wrong, sizeof wrong, offsetof(tv_two_view, probability_wrong), result);
+}
+
 }  // namespace tv
 
 void tv_pixel_pairs_init_sized(tv_pixel_pairs* pairs, size_t struct_size) {
@@ -375,76 +462,9 @@ tv_status tv_estimate_two_view(tv_context* context, const tv_camera* camera0,
                                const tv_camera* camera1, const tv_pixel_pairs* pairs,
                                const tv_estimate_options* options, tv_two_view* result,
                                uint8_t* inlier_mask) {
-  if (context == nullptr || result == nullptr) return TV_ERR_NULL;
-  tv_pixel_pairs given;
-  tv_status status = tv::read_pixel_pairs(pairs, &given);
-  if (status == TV_OK) status = tv::check_sized(result);
-  if (status != TV_OK) return status;
-  const double *const pixels0 = given.pixels0, *const pixels1 = given.pixels1;
-  const float* const ratios = given.ratios;
-  const int32_t num_matches = given.num;
-  if ((camera0 == nullptr) != (camera1 == nullptr)) return TV_ERR_ARGUMENT;
-  const bool calibrated = camera0 != nullptr;
-  tv::TwoViewProblem problem{};
-  status = tv::read_estimate_options(options, calibrated, &problem.options);
-  if (status != TV_OK) return status;
-  if (num_matches > context->limits.max_matches || !tv::made_for(*context, TV_PURPOSE_ESTIMATE)) {
-    return TV_ERR_LIMITS;
-  }
-  if (calibrated) {
-    status = tv_camera_check(camera0);
-    if (status == TV_OK) status = tv_camera_check(camera1);
-    if (status != TV_OK) return status;
-  }
-  if (tv::arrays_overlap(given, pairs, options, camera0, camera1, result, inlier_mask)) {
-    return TV_ERR_OVERLAP;
-  }
-  tv::ArenaScope scope(context->arena);
-  tv::Matches matches{};
-  tv::TwoViewModel model{};
-  const tv_camera* cameras[2] = {camera0, camera1};
-  bool swapped;
-  {
-    tv::StageTimer timer(context, TV_STAGE_ESTIMATE);
-    problem.pixels[0] = pixels0;
-    problem.pixels[1] = pixels1;
-    problem.ratios = ratios;
-    problem.sigmas[0] = given.sigmas0;
-    problem.sigmas[1] = given.sigmas1;
-    problem.num = num_matches;
-    swapped = tv::exchanged(camera0, camera1, problem);
-    problem.calibrated = calibrated;
-    problem.one_camera = calibrated && std::memcmp(camera0, camera1, sizeof *camera0) == 0;
-    tv_estimate_options& o = problem.options;
-    if (problem.one_camera) {
-      o.focal_sigma0 = o.focal_sigma1 =
-          o.focal_sigma0 > o.focal_sigma1 ? o.focal_sigma0 : o.focal_sigma1;
-      o.center_sigma0 = o.center_sigma1 =
-          o.center_sigma0 > o.center_sigma1 ? o.center_sigma0 : o.center_sigma1;
-    }
-    if (swapped) std::swap(cameras[0], cameras[1]);
-    if (calibrated) {
-      tv::take_cameras(cameras, problem);
-    }
-    if (swapped) {
-      std::swap(problem.pixels[0], problem.pixels[1]);
-      std::swap(problem.sigmas[0], problem.sigmas[1]);
-      std::swap(o.gravity0, o.gravity1);
-      std::swap(o.focal_sigma0, o.focal_sigma1);
-      std::swap(o.center_sigma0, o.center_sigma1);
-    }
-    problem.kernels = tvk_geometry_of(context->kernels);
-  }
-  tv::TwoViewOutcome outcome{};
-  int num_still = 0;
-  if (!tv::estimate_without_still(context, cameras, problem, &matches, &model, &outcome,
-                                  &num_still)) {
-    tv::estimate(context, problem, &matches, &model, &outcome);
-  }
-  tv::pack(problem, matches, model, outcome, swapped, num_still, result);
-  if (inlier_mask != nullptr) {
-    std::memset(inlier_mask, 0, static_cast<size_t>(num_matches));
-    for (int k = 0; k < matches.num_all; ++k) inlier_mask[matches.order[k]] = outcome.inlier[k];
-  }
-  return TV_OK;
+  tv::Evidence evidence;
+  const tv_status status = tv::estimate_two_view(context, camera0, camera1, pairs, options, result,
+                                                 inlier_mask, &evidence);
+  if (status == TV_OK) tv::write_judgement(tv::judge(evidence), result);
+  return status;
 }

@@ -13,6 +13,7 @@
 #include "robust/gravity.h"
 #include "robust/ldlt.h"
 #include "robust/loop.h"
+#include "robust/verdict.h"
 
 namespace tv {
 namespace {
@@ -96,11 +97,6 @@ constexpr double kLeastScale = 0.02;  // in thresholds: exact matches come from 
 constexpr int kFinalRounds = 2, kFinalIterations = 20;
 constexpr double kFinalGains[kFinalRounds] = {1e-3, 1e-6};
 
-// Fewer different inliers are too few, as in robust/verdict.cc.
-constexpr int kFewMatches = 15;
-// The largest standard deviation of a rotation, and of the position over the distance of the
-// points.
-constexpr double kMostSigma = 1.25 * kPi / 180;
 // Twice the logarithm of a thousand: evidence against a pose at a significance of 0.001.
 constexpr double kEvidence = 13.815510557964274;
 // Chi-square of two degrees of freedom at 99 per cent, up to which gravity agrees with the matches.
@@ -403,6 +399,80 @@ int count_inliers(const Finish& f, const Pose& pose, tv_absolute_pose* out, uint
   return different;
 }
 
+// Refinement, twin, inliers and covariance; what the pose is judged by goes to *evidence, which is
+// given as AbsoluteEvidence{}.
+void fit_absolute_pose(const SightingInput& input, const Sightings& s,
+                       const tv_absolute_pose_options& options, const AbsolutePoseSearch& search,
+                       Arena& arena, tv_absolute_pose* out, uint8_t* mask,
+                       AbsoluteEvidence* evidence) {
+  ArenaScope scope(arena);
+  evidence->threshold_px = options.max_error_px;
+  evidence->num_matches = s.num_all;
+  evidence->num_different = s.num;
+  const size_t n = static_cast<size_t>(s.num_all);
+  Finish f{input,
+           s,
+           options.max_error_px,
+           {},
+           arena_alloc<int32_t>(arena, n),
+           arena_alloc<double>(arena, n)};
+  const GravityPrior prior =
+      gravity_prior(options.gravity_in_world, options.gravity_in_camera, options.gravity_sigma_rad);
+  if (prior.known)
+    f.gravity = {1 / (prior.sigma_rad * prior.sigma_rad), prior.down[0], prior.down[1]};
+  const Candidate found = refined(f, search.found ? &search.pose : nullptr);
+  int different = search.found ? count_inliers(f, found.pose, out, nullptr) : 0;
+  const double log_alarms = different > 3
+                                ? log_false_alarms(s.num, different, 3, kMaxAbsolutePose3pt,
+                                                   chance_of(f, found.pose, options.seed))
+                                : 0;
+  if (!found.determined || !(log_alarms < kLogMeaningful)) {
+    // No pose: too few matches, points on a line, or no more inliers than chance explains.
+    out->num_inliers = 0;
+    out->coverage = out->rms_error_px = 0;
+    for (int i = 0; i < s.num; ++i) f.indices[i] = i;
+    const Vec3 sizes = spread_of(f, s.num).svd.s;
+    evidence->is_on_line = !(sizes[1] > 1e-12 * sizes[0]);
+    return;
+  }
+  const Spread spread = spread_of(f, different);
+  const Vec3& sizes = spread.svd.s;
+  const bool is_flat = sizes[2] < 0.01 * sizes[1];
+  const Pose mirror = mirrored(found.pose, spread);
+  const Candidate twin = refined(f, is_flat ? &mirror : nullptr);
+  bool takes_twin = false;
+  if (twin.determined && turn_sq(twin.pose, found.pose) > 1e-6) {
+    const double difference = evidence_against(f, twin, found) - evidence_against(f, found, found);
+    takes_twin = difference < 0;
+    if (std::fabs(difference) < kEvidence) {
+      const Candidate& other = takes_twin ? found : twin;
+      out->has_alternative = evidence->has_alternative = true;
+      write_pose(s, other.pose, out->alternative_R, out->alternative_t);
+    }
+  }
+  const Candidate& best = takes_twin ? twin : found;
+  out->num_inliers = 0;
+  different = count_inliers(f, best.pose, out, mask);
+  out->has_pose = 1;
+  write_pose(s, best.pose, out->R, out->t);
+  out->has_covariance = best.has_covariance;
+  if (best.has_covariance) {
+    out->noise_px = best.noise_px;
+    store_covariance(s, best, out->covariance);
+  }
+  double centre[3];
+  place(best.pose, spread.mean, centre);
+  const double distance = length_of(centre);
+  const double focal = 0.5 * (input.camera.model.fx + input.camera.model.fy);
+  evidence->has_pose = true;
+  evidence->num_inliers = out->num_inliers;
+  evidence->num_different_inliers = different;
+  evidence->noise_px = best.noise_px;
+  if (best.has_covariance) evidence->sigma_rad = largest_sigma(best, distance);
+  evidence->coverage = out->coverage;
+  evidence->width_px = std::sqrt(sizes[1] / different) / distance * focal;
+}
+
 }  // namespace
 
 void search_absolute_pose(const Sightings& sightings, const tv_absolute_pose_options& options,
@@ -429,78 +499,11 @@ void search_absolute_pose(const Sightings& sightings, const tv_absolute_pose_opt
 void finish_absolute_pose(const SightingInput& input, const Sightings& s,
                           const tv_absolute_pose_options& options, const AbsolutePoseSearch& search,
                           Arena& arena, tv_absolute_pose* out, uint8_t* mask) {
-  ArenaScope scope(arena);
-  const size_t n = static_cast<size_t>(s.num_all);
-  Finish f{input,
-           s,
-           options.max_error_px,
-           {},
-           arena_alloc<int32_t>(arena, n),
-           arena_alloc<double>(arena, n)};
-  const GravityPrior prior =
-      gravity_prior(options.gravity_in_world, options.gravity_in_camera, options.gravity_sigma_rad);
-  if (prior.known)
-    f.gravity = {1 / (prior.sigma_rad * prior.sigma_rad), prior.down[0], prior.down[1]};
-  const Candidate found = refined(f, search.found ? &search.pose : nullptr);
-  int different = search.found ? count_inliers(f, found.pose, out, nullptr) : 0;
-  const double log_alarms = different > 3
-                                ? log_false_alarms(s.num, different, 3, kMaxAbsolutePose3pt,
-                                                   chance_of(f, found.pose, options.seed))
-                                : 0;
-  if (!found.determined || !(log_alarms < kLogMeaningful)) {
-    // No pose: too few matches, points on a line, or no more inliers than chance explains.
-    out->num_inliers = 0;
-    out->coverage = out->rms_error_px = 0;
-    for (int i = 0; i < s.num; ++i) f.indices[i] = i;
-    const Vec3 sizes = spread_of(f, s.num).svd.s;
-    out->reasons = s.num < kFewMatches              ? TV_REASON_TOO_FEW_MATCHES
-                   : !(sizes[1] > 1e-12 * sizes[0]) ? TV_REASON_CROWDED_MATCHES
-                                                    : TV_REASON_LOW_INLIER_RATIO;
-    return;
-  }
-  const Spread spread = spread_of(f, different);
-  const Vec3& sizes = spread.svd.s;
-  const bool is_flat = sizes[2] < 0.01 * sizes[1];
-  const Pose mirror = mirrored(found.pose, spread);
-  const Candidate twin = refined(f, is_flat ? &mirror : nullptr);
-  bool takes_twin = false;
-  if (twin.determined && turn_sq(twin.pose, found.pose) > 1e-6) {
-    const double difference = evidence_against(f, twin, found) - evidence_against(f, found, found);
-    takes_twin = difference < 0;
-    if (std::fabs(difference) < kEvidence) {
-      const Candidate& other = takes_twin ? found : twin;
-      out->has_alternative = 1;
-      out->reasons |= TV_REASON_TWO_PLANAR_SOLUTIONS;
-      write_pose(s, other.pose, out->alternative_R, out->alternative_t);
-    }
-  }
-  const Candidate& best = takes_twin ? twin : found;
-  out->num_inliers = 0;
-  different = count_inliers(f, best.pose, out, mask);
-  out->has_pose = 1;
-  write_pose(s, best.pose, out->R, out->t);
-  out->has_covariance = best.has_covariance;
-  if (best.has_covariance) {
-    out->noise_px = best.noise_px;
-    store_covariance(s, best, out->covariance);
-  }
-  // The verdict, by the rules of robust/verdict.cc.
-  double centre[3];
-  place(best.pose, spread.mean, centre);
-  const double distance = length_of(centre);
-  const double focal = 0.5 * (input.camera.model.fx + input.camera.model.fy);
-  const double width_px = std::sqrt(sizes[1] / different) / distance * focal;
-  if (different < kFewMatches) out->reasons |= TV_REASON_TOO_FEW_MATCHES;
-  if (4 * out->num_inliers < s.num_all || best.noise_px > 0.7 * options.max_error_px) {
-    out->reasons |= TV_REASON_LOW_INLIER_RATIO;
-  }
-  if (!best.has_covariance || !(largest_sigma(best, distance) <= kMostSigma)) {
-    out->reasons |= TV_REASON_LOW_PARALLAX;
-  }
-  if (out->coverage < 4.5 / 64 || width_px < 3 * options.max_error_px) {
-    out->reasons |= TV_REASON_CROWDED_MATCHES;
-  }
-  out->verdict = out->reasons == 0 ? TV_VERDICT_OK : TV_VERDICT_DOUBTFUL;
+  AbsoluteEvidence evidence;
+  fit_absolute_pose(input, s, options, search, arena, out, mask, &evidence);
+  const Judgement judgement = judge(evidence);
+  out->verdict = judgement.verdict;
+  out->reasons = judgement.reasons;
 }
 
 }  // namespace tv

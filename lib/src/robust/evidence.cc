@@ -47,7 +47,7 @@ double line_distance_px(const Fit& f, int view) {
   }
   Mat3 sum;
   sum << xx, xy, xz, xy, yy, yz, xz, yz, zz;
-  return std::sqrt(svd3(sum).s[2] / f.num_support) / f.out->evidence.pixel_angle_rad;
+  return std::sqrt(svd3(sum).s[2] / f.num_support) / f.out->evidence->pixel_angle_rad;
 }
 
 struct Box {
@@ -211,7 +211,7 @@ double largest_turn_sq(Fit& f, int view, const FixedPose& pose, const PoseEquati
 
 // tv_two_view.region_shift_rad: the mean of both views' largest turns.
 double region_shift_rad(Fit& f) {
-  const double noise_px = std::max(f.out->evidence.noise_px, 0.1 * f.threshold);
+  const double noise_px = std::max(f.out->evidence->noise_px, 0.1 * f.threshold);
   FixedPose pose;
   pose.essential = essential_from_pose(f.out->epipolar.pose);
   pose_columns(f.out->epipolar.pose, pose.columns);
@@ -227,7 +227,7 @@ double region_shift_rad(Fit& f) {
 
 // Parallax, uncertainty, lines of points and stability, of a full pose.
 void measure_pose(Fit& f) {
-  Evidence& evidence = f.out->evidence;
+  Evidence& evidence = *f.out->evidence;
   double sum = 0, weights = 0;
   if (f.num_support == 0) return;
   for (int k = 0; k < f.num_support; ++k) {
@@ -247,7 +247,7 @@ void measure_pose(Fit& f) {
 
 void measure_inliers(Fit& f) {
   TwoViewOutcome& out = *f.out;
-  Evidence& evidence = out.evidence;
+  Evidence& evidence = *out.evidence;
   const bool by_transfer = evidence.kind == TV_KIND_PANORAMIC ||
                            evidence.kind == TV_KIND_NO_MOTION ||
                            evidence.kind == TV_KIND_PLANAR_OR_PANORAMIC;
@@ -325,7 +325,7 @@ bool has_second_model(Fit& f, Arena& arena) {
     transfer_squares(f.matches.pairs, 0, n, out.H, f.values);
   }
   for (int i = 0; i < n; ++i) explained[i] = f.values[i] <= limit * limit;
-  return find_second_model(f.matches, explained, out.evidence.num_different_inliers, f.threshold,
+  return find_second_model(f.matches, explained, out.evidence->num_different_inliers, f.threshold,
                            f.problem.options.seed, arena)
       .found;
 }
@@ -335,7 +335,7 @@ bool has_second_model(Fit& f, Arena& arena) {
 // (robust/verdict.cc). Where that cannot be, as for most pairs, both measures stay 0.
 void measure_lattices(Fit& f, Arena& arena) {
   ArenaScope scope(arena);
-  Evidence& evidence = f.out->evidence;
+  Evidence& evidence = *f.out->evidence;
   const int n = f.matches.num_unique();
   double* const xy[2] = {arena_alloc<double>(arena, 2 * static_cast<size_t>(n)),
                          arena_alloc<double>(arena, 2 * static_cast<size_t>(n))};
@@ -370,7 +370,7 @@ size_t evidence_bytes(int max_matches) {
 }
 
 void measure_evidence(Fit& f, Arena& arena) {
-  Evidence& evidence = f.out->evidence;
+  Evidence& evidence = *f.out->evidence;
   measure_inliers(f);
   if (f.out->has_t) measure_pose(f);
   if (!f.problem.calibrated || evidence.kind == TV_KIND_DEGENERATE) return;

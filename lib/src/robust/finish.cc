@@ -1,5 +1,6 @@
 // What follows the search, in this order: the model is refined over all of its inliers, rivals are
-// fitted, the kind is chosen and with it the pose, evidence is measured, and the verdict decided.
+// fitted, the kind is chosen and with it the pose, the evidence is measured, and the covariance is
+// completed with it. robust/verdict.cc judges the evidence afterwards.
 #include <algorithm>
 #include <cmath>
 
@@ -14,7 +15,6 @@
 #include "robust/planar_pose.h"
 #include "robust/refine.h"
 #include "robust/two_view.h"
-#include "robust/verdict.h"
 
 namespace tv {
 
@@ -95,7 +95,7 @@ void finish_two_view(TwoViewProblem& problem, const TwoViewModel& model, Arena& 
   if (!out.epipolar.found) f.num_support = 0;
   const int sample_size = least_matches(problem.options.method);
   const tv_kind kind = choose_kind(f, rivals, sample_size);
-  out.evidence.kind = kind;
+  out.evidence->kind = kind;
   out.H = rivals.H;
   out.has_H = kind == TV_KIND_PLANAR || kind == TV_KIND_PLANAR_OR_PANORAMIC;
   switch (kind) {
@@ -132,9 +132,8 @@ void finish_two_view(TwoViewProblem& problem, const TwoViewModel& model, Arena& 
   }
   measure_evidence(f, arena);
   const double growth =
-      growth_by_disagreement(out.evidence.num_different_inliers, out.evidence.num_different);
-  out.evidence.direction_sigma_rad *= std::sqrt(growth);
-  out.judgement = judge(out.evidence);
+      growth_by_disagreement(out.evidence->num_different_inliers, out.evidence->num_different);
+  out.evidence->direction_sigma_rad *= std::sqrt(growth);
   for (int k = 0; k < 25; ++k) {
     out.covariance[k] *= growth;
     out.alternative_covariance[k] *= growth;

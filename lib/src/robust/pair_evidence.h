@@ -1,5 +1,6 @@
-// What was measured of a pair: all that the verdict and the probability of a wrong pose are decided
-// from. robust/evidence.h measures it.
+// What was measured of a pose: all that the verdict and the probability of a wrong pose are decided
+// from. Of a pair robust/evidence.h measures it, and the descriptors of its matches add to it
+// (api/reconstruct.cc); of a camera before known points pose/absolute_pose.h does.
 #pragma once
 
 #include "base/math.h"
@@ -9,13 +10,20 @@ namespace tv {
 
 inline constexpr double kUnknown = __builtin_inf();
 
-// What was measured of a pair. An array of two has one entry a view.
-struct Evidence {
-  tv_kind kind = TV_KIND_DEGENERATE;
+// What a pose stands on, whether a pair's or that of a camera before known points.
+struct Support {
   double threshold_px = 0;
-  int num_trials = 1;  // attempts at this pair, this one included
+  double noise_px = 0;          // noise of a matched pixel; of a pair 0 without a covariance
+  double sigma_rad = kUnknown;  // the largest standard deviation of the pose
   // Usable matches and inliers; `different` ones do not count the repeats of a match.
   int num_matches = 0, num_inliers = 0, num_different = 0, num_different_inliers = 0;
+  bool has_alternative = false;  // whether a second pose fits about equally well
+};
+
+// What was measured of a pair. An array of two has one entry a view.
+struct Evidence : Support {
+  tv_kind kind = TV_KIND_DEGENERATE;
+  int num_trials = 1;           // attempts at this pair, this one included
   double coverage[2] = {0, 0};  // share of an 8x8 grid on the image that holds an inlier
   int num_places[2] = {0, 0};   // cells of about 32 pixels that hold an inlier
   double agreement = 0;         // share of the matches that are inliers, weighted by (1 - ratio)^2
@@ -24,10 +32,12 @@ struct Evidence {
   bool has_second_model = false;
   bool has_opposite_motion = false;  // matches agree on the opposite direction (a full pose)
   double lattice_share[2] = {0, 0}, lattice_sigmas[2] = {0, 0};
-  // The fields from here on are measured of a full pose (calibrated or planar).
-  bool has_alternative = false;  // whether a second motion of the plane fits
-  double noise_px = 0;           // noise of a matched pixel; 0 where there is no covariance
-  double sigma_rad = kUnknown;   // the largest standard deviation of rotation and direction
+  // What the descriptors of the keypoints are evidence for, where they were examined: most inliers
+  // have a second place that looks the same; and, measured only of a pair with nothing else against
+  // it, more keypoints match when one picture is mirrored.
+  bool looks_repeated = false, looks_mirrored = false;
+  // The fields from here on are measured of a full pose (calibrated or planar), as are noise,
+  // standard deviation and alternative, a second motion of the plane.
   // The stated standard deviation of the direction, without what the calibration adds to it.
   double direction_sigma_rad = kUnknown;
   // By how much the direction would move with cameras that the matches do not contradict; 0 where
@@ -40,6 +50,15 @@ struct Evidence {
   // For each image, the root mean square distance in pixels of the inliers from the one line that
   // is fitted to all of them (in rays: from a plane through the camera's centre).
   double line_distance_px[2] = {kUnknown, kUnknown};
+};
+
+// What was measured of a camera before known points.
+struct AbsoluteEvidence : Support {
+  bool has_pose = false;  // a pose has more inliers than chance explains
+  // Of an attempt without a pose: the points of all matches lie on a line.
+  bool is_on_line = false;
+  double coverage = 0;  // share of an 8x8 grid on the image that holds an inlier
+  double width_px = 0;  // root mean square width of the inliers' points, seen at their distance
 };
 
 }  // namespace tv

@@ -47,7 +47,7 @@ void choose_planar_pose(Fit& f, const Rivals& rivals) {
     }
   }
   if (other >= 0) {
-    out.evidence.has_alternative = true;
+    out.evidence->has_alternative = true;
     out.alternative = poses[other];
   }
   PoseUncertainty uncertainty;

@@ -117,14 +117,14 @@ int find_still_matches(const TwoViewProblem& problem, uint8_t* is_still) {
 bool contradicts_still(const TwoViewProblem& problem, const Matches& matches,
                        const TwoViewOutcome& outcome, int num_still) {
   const uint32_t bad = TV_REASON_TOO_FEW_MATCHES | TV_REASON_LOW_INLIER_RATIO;
-  if (!outcome.has_R || outcome.evidence.kind == TV_KIND_NO_MOTION ||
-      (outcome.judgement.reasons & bad) != 0) {
+  if (!outcome.has_R || outcome.evidence->kind == TV_KIND_NO_MOTION ||
+      (judge(*outcome.evidence).reasons & bad) != 0) {
     return false;
   }
   const double sigma_rad = turn_sigma(outcome);
   if (sigma_rad < 0) return false;
   Motion motions[2];
-  const int num_motions = outcome.evidence.has_alternative ? 2 : 1;
+  const int num_motions = outcome.evidence->has_alternative ? 2 : 1;
   for (int m = 0; m < num_motions; ++m) {
     const Pose& pose = m == 0 ? outcome.epipolar.pose : outcome.alternative;
     motions[m] = Motion{{moved_camera(problem, 0, outcome.principal_point_shift_px),

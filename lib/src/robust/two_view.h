@@ -25,8 +25,7 @@ struct TwoViewModel {
 // All that the entry point writes to the caller's result: models on rays, and the views in the
 // canonical order that api/two_view.cc chooses.
 struct TwoViewOutcome {
-  Evidence evidence;  // what the verdict is based on, with the pair's kind
-  Judgement judgement;
+  Evidence* evidence = nullptr;  // what the pair is judged by, with its kind; the caller's
   EpipolarModel epipolar;
   bool has_R = false, has_t = false, has_H = false, has_covariance = false,
        has_alternative_covariance = false;
@@ -58,9 +57,10 @@ GravityPrior gravity_of(const TwoViewProblem& problem);
 void search_two_view(const TwoViewProblem& problem, const Matches& matches, Arena& arena,
                      TwoViewModel* model);
 
-// Refinement on all inliers, rivals, verdict, covariance (TV_STAGE_REFINE). *outcome is given as
-// TwoViewOutcome{}; outcome->inlier will lie in the arena. The rays of the matches move with the
-// principal point, and rays and the problem's cameras with the focal length.
+// Refinement on all inliers, rivals, covariance, evidence (TV_STAGE_REFINE). *outcome is given as
+// TwoViewOutcome{} with its evidence, which is Evidence{}; outcome->inlier will lie in the arena.
+// The rays of the matches move with the principal point, and rays and the problem's cameras with
+// the focal length.
 void finish_two_view(TwoViewProblem& problem, const TwoViewModel& model, Arena& arena,
                      Matches* matches, TwoViewOutcome* outcome);
 

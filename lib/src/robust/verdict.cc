@@ -11,27 +11,37 @@ namespace {
 // Fewer different inliers than this support no pose: five of them fit any pose exactly, and the
 // others are too few to contradict a wrong one. COLMAP requires as many.
 constexpr int kFewMatches = 15;
+// The largest standard deviation of a pose that is "ok".
+constexpr double kMostSigma = 1.25 * kPi / 180;
+// The probability of a wrong pose, at the least, where descriptors are evidence against it.
+constexpr double kWrongByDescriptors = 0.5;
 
 bool has_full_pose(const Evidence& e) {
   return e.kind == TV_KIND_CALIBRATED || e.kind == TV_KIND_PLANAR;
 }
 
-// TOO_FEW_MATCHES: fewer than 15 different matches are inliers. Of a degenerate pair, which has no
-// inliers, fewer than 15 different matches were given.
-bool too_few_matches(const Evidence& e) {
-  const bool degenerate = e.kind == TV_KIND_DEGENERATE;
-  return (degenerate ? e.num_different : e.num_different_inliers) < kFewMatches;
+bool is_refused(const Evidence& e) {
+  return e.kind == TV_KIND_DEGENERATE || e.kind == TV_KIND_PANORAMIC || e.kind == TV_KIND_NO_MOTION;
 }
 
-// LOW_INLIER_RATIO, where there is no full pose whose probability says it better: fewer than 25 %
-// of the matches are inliers, or the residuals are uniform over the threshold, as random matches'
-// are: the noise that is estimated from their median is then 0.74 thresholds, and more than 0.7
-// counts as uniform. A degenerate pair has this reason when its matches are not too few: no model
-// explains more of them than chance does.
-bool low_inlier_ratio(const Evidence& e) {
-  if (e.kind == TV_KIND_DEGENERATE) return !too_few_matches(e);
-  return 4 * e.num_inliers < e.num_matches || e.noise_px > 0.7 * e.threshold_px;
+// TOO_FEW_MATCHES: fewer than 15 different matches are inliers. Where no model was found, which
+// leaves no inliers, fewer than 15 different matches were given.
+bool too_few_matches(const Support& s, bool has_model) {
+  return (has_model ? s.num_different_inliers : s.num_different) < kFewMatches;
 }
+
+// LOW_INLIER_RATIO, where there is no full pose of a pair, whose probability says it better: fewer
+// than 25 % of the matches are inliers, or the residuals are uniform over the threshold, as random
+// matches' are: the noise that is estimated from their median is then 0.74 thresholds, and more
+// than 0.7 counts as uniform. Where no model was found, matches that are not too few have this
+// reason: no model explains more of them than chance does.
+bool low_inlier_ratio(const Support& s, bool has_model) {
+  if (!has_model) return !too_few_matches(s, has_model);
+  return 4 * s.num_inliers < s.num_matches || s.noise_px > 0.7 * s.threshold_px;
+}
+
+// CROWDED_MATCHES of all poses: the inliers lie in at most 4 of the 64 cells of a grid.
+bool has_few_cells(double coverage) { return coverage < 4.5 / 64; }
 
 // LOW_PARALLAX: the direction of t is not determined well enough. The median parallax is below 3
 // thresholds or 10 standard deviations of the noise; or the noise gives the rotation or the
@@ -42,7 +52,7 @@ bool low_inlier_ratio(const Evidence& e) {
 // likely as not off by more than 10 degrees (46 per cent where the error has one axis, 58 where it
 // has none; docs/decisions/0007-verdict-and-covariance.md).
 bool low_parallax(const Evidence& e) {
-  constexpr double kMostSigma = 1.25 * kPi / 180, kMostDirectionSigma = 13.5 * kPi / 180;
+  constexpr double kMostDirectionSigma = 13.5 * kPi / 180;
   const double least_px = std::max(3 * e.threshold_px, 10 * e.noise_px);
   return has_full_pose(e) &&
          (e.median_parallax_rad < least_px * e.pixel_angle_rad || !(e.sigma_rad <= kMostSigma) ||
@@ -57,7 +67,7 @@ bool low_parallax(const Evidence& e) {
 // a change of scale by 2 the other image's lie in a quarter of the area, and the pose is as
 // accurate (docs/decisions/0007-verdict-and-covariance.md).
 bool crowded_matches(const Evidence& e) {
-  const bool few_cells = e.num_inliers > 0 && coverage_of(e) < 4.5 / 64;
+  const bool few_cells = e.num_inliers > 0 && has_few_cells(coverage_of(e));
   const double nearest = std::min(e.line_distance_px[0], e.line_distance_px[1]);
   constexpr double kMostShift = 2.5 * kPi / 180;
   return few_cells ||
@@ -86,8 +96,9 @@ bool on_a_lattice(const Evidence& e) {
 // The reasons of evidence that is certain, whatever the probability, as bits of tv_reason.
 uint32_t reasons_of(const Evidence& e) {
   uint32_t reasons = 0;
-  if (too_few_matches(e)) reasons |= TV_REASON_TOO_FEW_MATCHES;
-  if (!has_full_pose(e) && low_inlier_ratio(e)) reasons |= TV_REASON_LOW_INLIER_RATIO;
+  const bool has_model = e.kind != TV_KIND_DEGENERATE;
+  if (too_few_matches(e, has_model)) reasons |= TV_REASON_TOO_FEW_MATCHES;
+  if (!has_full_pose(e) && low_inlier_ratio(e, has_model)) reasons |= TV_REASON_LOW_INLIER_RATIO;
   if (e.kind == TV_KIND_DEGENERATE) return reasons;
   if (low_parallax(e)) reasons |= TV_REASON_LOW_PARALLAX;
   if (crowded_matches(e)) reasons |= TV_REASON_CROWDED_MATCHES;
@@ -107,7 +118,17 @@ uint32_t reasons_of(const Evidence& e) {
   } else if (e.has_second_model) {
     reasons |= TV_REASON_SECOND_MOTION;
   }
+  if (is_refused(e)) return reasons;
+  if (e.looks_repeated) reasons |= TV_REASON_REPEATED_STRUCTURE;
+  // Of mirrored pictures the matches that would show that the pictures are of one scene are
+  // missing. Those that there are lie on corners that are their own mirror image, and for such
+  // matches there is a pose, too.
+  if (e.looks_mirrored) reasons |= TV_REASON_LOW_INLIER_RATIO;
   return reasons;
+}
+
+tv_verdict verdict_of(bool refused, uint32_t reasons) {
+  return refused ? TV_VERDICT_REFUSED : reasons == 0 ? TV_VERDICT_OK : TV_VERDICT_DOUBTFUL;
 }
 
 }  // namespace
@@ -124,39 +145,47 @@ Judgement judge(const Evidence& e) {
     const Belief belief = belief_of(e);
     probability_wrong = belief.probability_wrong;
     if (!(probability_wrong <= kMostProbabilityWrong)) reasons |= belief.raised_by;
+    if (e.looks_repeated || e.looks_mirrored) {
+      probability_wrong = std::max(probability_wrong, kWrongByDescriptors);
+    }
   }
-  const bool refused =
-      e.kind == TV_KIND_DEGENERATE || e.kind == TV_KIND_PANORAMIC || e.kind == TV_KIND_NO_MOTION;
-  return {refused        ? TV_VERDICT_REFUSED
-          : reasons == 0 ? TV_VERDICT_OK
-                         : TV_VERDICT_DOUBTFUL,
-          reasons, probability_wrong};
+  return {verdict_of(is_refused(e), reasons), reasons, probability_wrong};
 }
 
-// LOW_INLIER_RATIO for mirrored pictures: the matches that would show that the pictures are of one
-// scene are missing. Those that there are lie on corners that are their own mirror image, and for
-// such matches there is a pose, too.
-void doubt(tv_reason reason, tv_two_view* estimate) {
-  estimate->reasons |= static_cast<uint32_t>(reason);
-  estimate->probability_wrong = std::max(estimate->probability_wrong, 0.5);
-  if (estimate->verdict == TV_VERDICT_OK) estimate->verdict = TV_VERDICT_DOUBTFUL;
+// Refused: no pose has more inliers than chance explains. The rules are those of a pair, but for
+// what a pair alone has. CROWDED_MATCHES is also said of points on a line, and of inliers that are
+// together less than 3 thresholds wide: on what is so narrow in the image a turn about it is not
+// seen.
+Judgement judge(const AbsoluteEvidence& e) {
+  uint32_t reasons = 0;
+  if (!e.has_pose) {
+    reasons = too_few_matches(e, false) ? TV_REASON_TOO_FEW_MATCHES
+              : e.is_on_line            ? TV_REASON_CROWDED_MATCHES
+                                        : TV_REASON_LOW_INLIER_RATIO;
+    return {TV_VERDICT_REFUSED, reasons, 1};
+  }
+  if (e.has_alternative) reasons |= TV_REASON_TWO_PLANAR_SOLUTIONS;
+  if (too_few_matches(e, true)) reasons |= TV_REASON_TOO_FEW_MATCHES;
+  if (low_inlier_ratio(e, true)) reasons |= TV_REASON_LOW_INLIER_RATIO;
+  if (!(e.sigma_rad <= kMostSigma)) reasons |= TV_REASON_LOW_PARALLAX;
+  if (has_few_cells(e.coverage) || e.width_px < 3 * e.threshold_px) {
+    reasons |= TV_REASON_CROWDED_MATCHES;
+  }
+  return {verdict_of(false, reasons), reasons, 0};
 }
 
 // Guided matching finds matches where the first estimate has their epipolar lines: their agreement
-// with it is no evidence for it, and so the verdict, the reasons and the tests of the cameras
-// stay those of the first. The second estimate is the more accurate one and replaces the
-// first, unless it is of another kind, has fewer inliers, is judged worse, or has a second motion
-// of the plane where the first has none (or the reverse): then the matches that were added
-// contradict it.
-bool takes_guided_estimate(const tv_two_view& first, tv_two_view* again) {
+// with it is no evidence for it, and so the judgement and the measures that it is from stay those
+// of the first. The second estimate is the more accurate one and replaces the first, unless it is
+// of another kind, has fewer inliers, is judged worse, or has a second motion of the plane where
+// the first has none (or the reverse): then the matches that were added contradict it.
+bool takes_guided_estimate(const tv_two_view& first, tv_verdict verdict_of_first,
+                           tv_verdict verdict_of_again, tv_two_view* again) {
   if (again->has_R == 0 || again->has_t == 0 || again->kind != first.kind ||
-      again->has_alternative != first.has_alternative || again->verdict < first.verdict ||
+      again->has_alternative != first.has_alternative || verdict_of_again < verdict_of_first ||
       again->num_inliers < first.num_inliers) {
     return false;
   }
-  again->verdict = first.verdict;
-  again->reasons = first.reasons;
-  again->probability_wrong = first.probability_wrong;
   again->agreement = first.agreement;
   again->region_shift_rad = first.region_shift_rad;
   again->num_places = first.num_places;

@@ -1,6 +1,7 @@
-// The verdict and its reasons: what was measured of a pair, and what is decided from it. Verdict
-// and reasons are decided only here, and only from Evidence. They are the same when the views are
-// exchanged. docs/decisions/0007-verdict-and-covariance.md.
+// The one judge: what is decided from what was measured of a pose. Verdict and reasons of a pair
+// and of a camera before known points are decided only here, once all evidence is complete, and
+// nothing changes them afterwards. Those of a pair are the same when the views are exchanged.
+// docs/decisions/0007-verdict-and-covariance.md.
 #pragma once
 
 #include "robust/pair_evidence.h"
@@ -14,17 +15,16 @@ struct Judgement {
 };
 
 Judgement judge(const Evidence& evidence);
+// Of an absolute pose; there is no probability for it: 0 with a pose, else 1.
+Judgement judge(const AbsoluteEvidence& evidence);
 
 // The coverage that is reported and judged: the larger of the two views'.
 double coverage_of(const Evidence& evidence);
 
-// Gives an estimate a reason that its matches do not show, only their descriptors:
-// TV_REASON_LOW_INLIER_RATIO where the pictures match better when one of them is mirrored,
-// TV_REASON_REPEATED_STRUCTURE where most inliers have a second place that looks the same.
-void doubt(tv_reason reason, tv_two_view* estimate);
-
-// Whether the estimate with the matches of guided matching replaces the first one. Where it does,
-// it is given the first one's verdict, reasons and tests of the cameras.
-bool takes_guided_estimate(const tv_two_view& first, tv_two_view* again);
+// Whether the geometry of the estimate with the matches of guided matching replaces that of the
+// first one. The verdicts are those of the two by themselves. Where it does, *again is given the
+// first one's measures of evidence, which the first one's judgement is from and which stay.
+bool takes_guided_estimate(const tv_two_view& first, tv_verdict verdict_of_first,
+                           tv_verdict verdict_of_again, tv_two_view* again);
 
 }  // namespace tv
