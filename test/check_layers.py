@@ -1,12 +1,15 @@
 #!/usr/bin/env python3
 """Keeps the layers of docs/contributing.md: which folder of lib/src may include which, who may see
-Eigen, pixels, the heap and the internals at all, that no files include one another in a circle, and
-that the rooms (folders) of tools/twoview include one another only as ROOMS allows. Reads the
-#include lines; prints each offence."""
+Eigen, pixels, the heap and the internals at all, that no files include one another in a circle,
+that no sources of a folder call one another in one and no Python modules import one another in one,
+and that the rooms (folders) of tools/twoview include one another only as ROOMS allows. Reads the
+sources' text; prints each offence."""
 import posixpath
 import re
 import sys
 from pathlib import Path
+
+import circles
 
 # LAYERS[layer]: the layers whose headers the files of this layer may include.
 LAYERS = {
@@ -171,25 +174,11 @@ def included_units(name, headers, files):
 
 
 def find_circles(files):
-    """One shortest circle of includes through each unit that is part of a circle; each circle is
-    listed once."""
+    """The circles of includes, as circles.circles_of lists them."""
     edges = {}
     for name, headers in files.items():
         edges.setdefault(unit_of(name), set()).update(included_units(name, headers, files))
-    circles = {}
-    for start in sorted(edges):
-        paths, seen = [[start]], {start}
-        while paths:
-            path = paths.pop(0)
-            for unit in sorted(edges.get(path[-1], ())):
-                if unit == start:
-                    circles.setdefault(frozenset(path), path + [start])
-                    paths = []
-                    break
-                if unit not in seen:
-                    seen.add(unit)
-                    paths.append(path + [unit])
-    return list(circles.values())
+    return circles.circles_of(edges)
 
 
 def room_offences(files):
@@ -311,13 +300,29 @@ def self_check():
         "lib/src/robust/d.h": []})
 
 
+def code_circles(root):
+    """Yields each circle of sources that call each other and of Python modules."""
+    sources = {path.relative_to(root).as_posix(): path.read_text()
+               for top in ("lib/src",) + OUTSIDE for path in sorted((root / top).rglob("*"))
+               if path.suffix in {".c", ".cc"} and path.is_file()}
+    for circle in circles.circles_of(circles.calls(sources)):
+        yield "a circle of files: " + " calls ".join(circle)
+    for top in ("tools/python", "python"):
+        modules = {".".join(path.relative_to(root / top).with_suffix("").parts): path.read_text()
+                   for path in sorted((root / top).rglob("*.py"))}
+        for circle in circles.circles_of(circles.imports(modules)):
+            yield "a circle of modules: " + " imports ".join(circle)
+
+
 def main():
     self_check()
     rooms_self_check()
-    files = read_includes(Path(sys.argv[1]))
+    circles.self_check()
+    root = Path(sys.argv[1])
+    files = read_includes(root)
     if not any(name.startswith("lib/src/") for name in files):
         sys.exit(f"no sources under {sys.argv[1]}/lib/src")
-    found = [*offences(files), *room_offences(files)]
+    found = [*offences(files), *room_offences(files), *code_circles(root)]
     for offence in found:
         print(offence)
     print(f"{len(files)} files, {len(found)} offences")

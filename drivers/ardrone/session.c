@@ -119,10 +119,6 @@ void ardrone_session_close(ardrone_session *session) {
   ardrone_video_close(session);
 }
 
-void ardrone_tell(ardrone_session *session, ardrone_event event, const char *key) {
-  if (session->options.on_event) session->options.on_event(session->options.user, event, key);
-}
-
 tvs_status ardrone_session_step(ardrone_session *session, int64_t now_ns) {
   if (!session) return TVS_ERR_NULL;
   if (now_ns < session->now_ns) return TVS_ERR_ARGUMENT;

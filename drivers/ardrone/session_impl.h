@@ -1,6 +1,6 @@
-/* What the parts of a session share. session.c: life, step, queries. session_link.c: navdata, link,
-   commands. session_exchange.c: set-up and the queue of exchanges. session_video.c: streams,
-   pictures. */
+/* What the parts of a session share. session.c: life, step, queries; it calls session_link.c:
+   navdata, link, commands, which calls session_exchange.c: set-up and the queue of exchanges, and
+   session_video.c: streams, pictures. All report through session_event.c. */
 #ifndef ARDRONE_SESSION_IMPL_H
 #define ARDRONE_SESSION_IMPL_H
 

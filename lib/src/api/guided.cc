@@ -26,11 +26,6 @@ tv_status read_guided_options(const tv_guided_options* options, tv_guided_option
   return valid ? TV_OK : TV_ERR_ARGUMENT;
 }
 
-size_t rays_bytes(int32_t max_keypoints) {
-  const size_t n = static_cast<size_t>(max_keypoints);
-  return arena_bytes<double>(3 * n) + arena_bytes<double>(6 * n) + arena_bytes<uint8_t>(n);
-}
-
 // Reads the keypoints of one view. Without a camera (null) the ray of a pixel is (x, y, 1).
 GuidedView make_view(const tv_camera* camera, const tv_features& features, Arena& arena) {
   const tv_keypoint* const keypoints = features.keypoints;
@@ -53,12 +48,6 @@ GuidedView make_view(const tv_camera* camera, const tv_features& features, Arena
 }
 
 }  // namespace
-
-size_t guided_scratch_bytes(const tv_limits& limits) {
-  const int32_t most = most_keypoints(limits);
-  return 2 * rays_bytes(most) + guided_bytes(most) +
-         arena_bytes<tv_correspondence>(static_cast<size_t>(most));
-}
 
 }  // namespace tv
 

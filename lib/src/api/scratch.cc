@@ -4,6 +4,7 @@
 
 #include "feature/corners.h"
 #include "feature/tilts.h"
+#include "match/guided.h"
 #include "match/match.h"
 #include "match/witness.h"
 #include "pose/absolute_pose.h"
@@ -12,14 +13,6 @@
 #include "twoview/reconstruct.h"
 
 namespace tv {
-
-// Two arrays of keypoints: what was found, and its order while corners are found, or the oriented
-// keypoints afterwards.
-size_t extract_scratch_bytes(const tv_limits& limits) {
-  const size_t keypoints = arena_bytes<tv_keypoint>(static_cast<size_t>(limits.max_keypoints));
-  return 2 * keypoints + std::max(corners_bytes(limits.max_width, limits.max_height),
-                                  octaves_bytes(limits.max_width, limits.max_height));
-}
 
 int32_t most_keypoints(const tv_limits& limits) {
   int32_t most = limits.max_keypoints;
@@ -33,6 +26,17 @@ int32_t most_chosen_matches(const tv_limits& limits) {
   return std::min(most_keypoints(limits), std::max(limits.max_matches, limits.max_keypoints));
 }
 
+namespace {
+
+// Two arrays of keypoints: what was found, and its order while corners are found, or the oriented
+// keypoints afterwards.
+size_t extract_scratch_bytes(const tv_limits& limits) {
+  const size_t keypoints = arena_bytes<tv_keypoint>(static_cast<size_t>(limits.max_keypoints));
+  return 2 * keypoints + std::max(corners_bytes(limits.max_width, limits.max_height),
+                                  octaves_bytes(limits.max_width, limits.max_height));
+}
+
+// The results of tv_reconstruct.
 size_t reconstruct_result_bytes(const tv_limits& limits) {
   const size_t n = static_cast<size_t>(most_keypoints(limits));
   const size_t m = static_cast<size_t>(most_chosen_matches(limits));
@@ -71,6 +75,15 @@ size_t effort_scratch_bytes(const tv_limits& limits) {
   }
   return most;
 }
+
+// Both views' rays, the matching, and what is found.
+size_t guided_scratch_bytes(const tv_limits& limits) {
+  const int32_t most = most_keypoints(limits);
+  return 2 * guided_view_bytes(most) + guided_bytes(most) +
+         arena_bytes<tv_correspondence>(static_cast<size_t>(most));
+}
+
+}  // namespace
 
 size_t scratch_bytes(const tv_limits& limits) {
   const size_t of_purpose[] = {extract_scratch_bytes(limits), match_bytes(most_keypoints(limits)),

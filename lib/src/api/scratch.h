@@ -18,9 +18,4 @@ int32_t most_keypoints(const tv_limits& limits);
 // How many matches of tv_reconstruct there is room for after the best were chosen.
 int32_t most_chosen_matches(const tv_limits& limits);
 
-// Parts of it: the scratch of tv_extract and of tv_match_guided, and the results of tv_reconstruct.
-size_t extract_scratch_bytes(const tv_limits& limits);
-size_t guided_scratch_bytes(const tv_limits& limits);
-size_t reconstruct_result_bytes(const tv_limits& limits);
-
 }  // namespace tv

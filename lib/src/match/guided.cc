@@ -183,6 +183,11 @@ float distance_ratio(int32_t best, double rival) {
 
 }  // namespace
 
+size_t guided_view_bytes(int32_t max_keypoints) {
+  const size_t n = static_cast<size_t>(max_keypoints);
+  return arena_bytes<double>(3 * n) + arena_bytes<double>(6 * n) + arena_bytes<uint8_t>(n);
+}
+
 size_t guided_bytes(int32_t max_keypoints) {
   const size_t n = static_cast<size_t>(max_keypoints);
   return 2 * side_bytes(max_keypoints) + 2 * arena_bytes<int32_t>(n) + arena_bytes<Nearest>(n) +

@@ -20,6 +20,8 @@ struct GuidedView {
   int32_t num;
 };
 
+// The bytes of the arena that the rays, slopes and flags of one view take.
+size_t guided_view_bytes(int32_t max_keypoints);
 // The bytes of the arena that match_guided needs for views of at most max_keypoints keypoints.
 size_t guided_bytes(int32_t max_keypoints);
 

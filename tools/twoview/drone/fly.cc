@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "base/output.h"
+#include "drone/drone.h"
 #include "drone/keyboard.h"
 #include "drone/link.h"
 

@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "base/output.h"
+#include "drone/drone.h"
 #include "drone/link.h"
 #include "drone/vehicle.h"
 

@@ -6,7 +6,7 @@
 #include <functional>
 #include <string>
 
-#include "drone/drone.h"
+#include "drone/options.h"
 #include "recording/driver_session.h"
 #include "twoview_drivers/ardrone/sockets.h"
 

@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "base/output.h"
 #include "base/terminal.h"
+#include "drone/drone.h"
 #include "drone/link.h"
 #include "drone/vehicle.h"
 #include "recording/recording.h"

@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "base/output.h"
 #include "drone/drone.h"
+#include "drone/options.h"
 #include "recording/playback.h"
 #include "recording/recording.h"
 #include "recording/vehicle.h"

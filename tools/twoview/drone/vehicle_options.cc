@@ -1,4 +1,4 @@
-#include "drone/drone.h"
+#include "drone/options.h"
 #include "drone/vehicle.h"
 
 namespace cli {

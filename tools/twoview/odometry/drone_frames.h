@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "drone/drone.h"
+#include "drone/options.h"
 #include "drone/vehicle.h"
 #include "odometry/frames.h"
 

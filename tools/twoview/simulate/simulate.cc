@@ -9,7 +9,7 @@
 
 #include "base/error.h"
 #include "base/output.h"
-#include "drone/drone.h"
+#include "drone/options.h"
 #include "files/camera_file.h"
 #include "files/camera_formats.h"
 #include "files/image_file.h"

@@ -20,7 +20,7 @@ from ..folders import foreign_result, foreign_words
 from ..progress import Lines, on_terminal
 from ..sizes import MAX_NATIVE_SIDE, RESIZE_LONG_SIDE
 from ..unread import unread_picture
-from . import cluster, extras, results, systems
+from . import cluster, extras, report_files, results, systems
 from .arguments import PIPELINES, PROGRAM, make_parser
 
 FORMAT = 1  # increase it if a change here changes the stored result of a pair
@@ -400,7 +400,7 @@ def compare(arguments):
         "resize": {t["set"]: t["resize"] for t in tasks},
     }
     report = results.make_report(arguments, run, pairs)
-    results.write(folder, report, pairs, tasks)
+    report_files.write(folder, report, pairs, tasks)
     extras.write(folder, report, pairs, arguments.tables, arguments.figures)
     store.remove()
     if not arguments.quiet:

@@ -1,15 +1,12 @@
-"""Summarises results over pairs, and writes the three files of a report."""
+"""Summarises results over pairs."""
 
-import csv
-import io
-import json
 import os
 import time
 
 import numpy as np
 
 from ..accuracy import metrics, tables
-from . import page, systems
+from . import pair_run, systems
 
 ERROR_KEYS = ("rotation_error_deg", "translation_error_deg", "translation_error_signed_deg",
               "pose_error_deg")
@@ -136,50 +133,13 @@ def make_report(arguments, run, pairs):
         "wall_seconds": run["wall_seconds"], "pairs_run_now": run["pairs_run_now"],
         "seconds": {"all": sum(seconds.values()), "by_module": seconds,
                     "twoview_share": seconds.get("twoview", 0) / max(1e-9, sum(seconds.values()))},
-        "histogram_edges_px": page.HISTOGRAM_EDGES_PX,
+        "histogram_edges_px": pair_run.HISTOGRAM_EDGES_PX.tolist(),
         "pairs": [{k: v for k, v in p.items() if k != "overlays"} for p in pairs]}
 
 
 def version(system, run):
     found = run["versions"].get(system.module, {})
     return {"version": found.get("version"), "missing": found.get("missing")}
-
-
-# ---- files -------------------------------------------------------------------------------------
-
-CSV_COLUMNS = ("set", "name0", "name1", "system", "kind", "status", *ERROR_KEYS, "num_keypoints0",
-               "num_keypoints1", "num_matches", "num_inliers", "precision", "time_ms", "num_points",
-               "num_in_front", "median_error_px", "p95_error_px", "time_us_per_point", "message")
-
-
-def csv_text(pairs):
-    text = io.StringIO()
-    table = csv.DictWriter(text, CSV_COLUMNS, restval="", extrasaction="ignore",
-                           lineterminator="\n")
-    table.writeheader()
-    for pair in pairs:
-        for kind, rows in pair["rows"].items():
-            for name, row in rows.items():
-                keypoints = row.get("num_keypoints") or ("", "")
-                table.writerow({
-                    **{k: pair[k] for k in ("set", "name0", "name1")},
-                    **{k: "" if v is None else v for k, v in row.items()},
-                    "system": name, "kind": kind,
-                    "num_keypoints0": keypoints[0], "num_keypoints1": keypoints[1]})
-    return text.getvalue()
-
-
-def write(folder, report, pairs, tasks):
-    """Writes the three files, each completely or not at all. The page is written last because it
-    refers to the others."""
-    texts = {"report.json": json.dumps(metrics.finite(report), allow_nan=False),
-             "pairs.csv": csv_text(pairs),
-             "index.html": page.render(report, pairs, tasks)}
-    for name, text in texts.items():
-        with open(os.path.join(folder, "unfinished", name + ".part"), "w", encoding="utf-8") as f:
-            f.write(text)
-    for name in texts:
-        os.replace(os.path.join(folder, "unfinished", name + ".part"), os.path.join(folder, name))
 
 
 # ---- the terminal ------------------------------------------------------------------------------
