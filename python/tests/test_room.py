@@ -104,6 +104,11 @@ def test_a_plain_wall_is_inferred_from_its_edges():
         assert known.sum() > 0.8 * middle.sum() and not (known & ~middle).any()
         assert np.abs(inferred - wall())[known].max() < 0.005 and (its_sigma[known] > 0).all()
         assert not room.infer(planes[:0], *seen)[0].any()
+        mask = x < 48
+        shown, _ = room.infer(planes, *seen, mask=mask)
+        assert (shown[:, :48] == inferred[:, :48]).all() and not shown[:, 48:].any()
+        with pytest.raises(ValueError):
+            room.infer(planes, *seen, mask=mask[:, :50])
         for x in (0.0, 0.01):  # two maps have to agree
             room.add(CAMERA, np.eye(3), [x, 0.0, 0.0], inferred, its_sigma, pixels=pixels,
                      inferred=True)
@@ -130,6 +135,8 @@ def test_what_c_could_not_read_is_refused():
             give(wall(), sigma=wall()[:50])
         with pytest.raises(ValueError):
             give(wall(), pixels=np.zeros((72, 96, 4), np.uint8))
+        with pytest.raises(TypeError):
+            give(wall(), mask=np.full((72, 96), 0.5))
         with pytest.raises(tv.TV_ERR_CAMERA):
             give(np.ascontiguousarray(wall()[:50]))
         with pytest.raises(tv.TV_ERR_ARGUMENT):

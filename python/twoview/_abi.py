@@ -312,7 +312,8 @@ class tv_depth_map(Structure):
     _fields_ = [("struct_size", c_uint32), ("width", c_int32), ("height", c_int32),
                 ("stride", c_int32), ("distance", c_void_p), ("sigma", c_void_p),
                 ("witnesses", c_void_p), ("pixels", c_void_p), ("pixel_stride_bytes", c_int64),
-                ("channels", c_int32), ("inferred", c_int32)]
+                ("channels", c_int32), ("inferred", c_int32), ("mask", c_void_p),
+                ("mask_stride_bytes", c_int64)]
 
 
 class tv_room_state(Structure):
@@ -629,10 +630,15 @@ def check_image(name: str, pixels: Any) -> tv_image:
                     max(pixels.strides[0], pixels.shape[1]))
 
 
+def mask_bytes(mask: Any) -> Any:
+    """A bool mask as uint8, without a copy; others as they are."""
+    is_bool = isinstance(mask, np.ndarray) and mask.dtype == np.bool_
+    return mask.view(np.uint8) if is_bool else mask
+
+
 def check_mask(name: str, mask: Any, image: np.ndarray) -> tv_image:
     """A view of a mask of the image's shape, uint8 or bool, without a copy."""
-    if isinstance(mask, np.ndarray) and mask.dtype == np.bool_:
-        mask = mask.view(np.uint8)
+    mask = mask_bytes(mask)
     view = check_image(name, mask)
     if mask.shape != image.shape:
         raise ValueError(f"{name}: the image's shape {image.shape} is expected, not {mask.shape}")

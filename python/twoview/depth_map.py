@@ -21,7 +21,8 @@ class DepthMap:
     distance: np.ndarray  #: (height, width) float32, along the pixel's ray; 0: not known
     sigma: np.ndarray  #: (height, width) float32, of the distance
     witnesses: np.ndarray  #: (height, width) uint8, how many other views show the same there
-    grey: np.ndarray  #: (height, width) uint8, the reference image as the camera would see it
+    grey: np.ndarray  #: (height, width) uint8, the reference image as the camera would see it; 0
+    #: beyond its edges, so that it is Room.add's mask as well
 
 
 def sweep_depth(images: Sequence[np.ndarray], cameras: Sequence[Camera],

@@ -81,25 +81,28 @@ class Room:
     def add(self, camera: Camera, R: Sequence[Sequence[float]], t: Sequence[float],
             distance: np.ndarray, sigma: Optional[np.ndarray] = None,
             witnesses: Optional[np.ndarray] = None, pixels: Optional[np.ndarray] = None, *,
-            inferred: bool = False) -> None:
+            mask: Optional[np.ndarray] = None, inferred: bool = False) -> None:
         """tv_room_add: fuses a depth map.
 
         camera: of the map's width and height. R (3, 3), t (3,): world_from_cam. distance:
         (height, width) float32, along each pixel's ray; 0 or NaN where it is unknown. sigma: the
         same, its standard deviation; None: a hundredth of it. witnesses: (height, width) uint8,
         how many other images confirmed it; 0: unknown. pixels: (height, width) or (height, width,
-        3) uint8, the image, grey or red, green, blue. inferred: no view measured these distances.
+        3) uint8, the image, grey or red, green, blue. mask: (height, width) uint8 or bool, 0
+        where the image shows nothing of the scene, as DepthMap.grey is beyond the edge of a lens;
+        None: all of it does. inferred: no view measured these distances.
         Raises TV_ERR_CAPACITY where the room has no memory left: it is then as it was;
         TV_ERR_CAMERA, TV_ERR_ARGUMENT, TV_ERR_NOT_FINITE, TV_ERR_LIMITS (too many maps)."""
-        self._fuse("tv_room_add", camera, R, t, distance, sigma, witnesses, pixels, inferred)
+        self._fuse("tv_room_add", camera, R, t, distance, sigma, witnesses, pixels, mask, inferred)
 
     def remove(self, camera: Camera, R: Sequence[Sequence[float]], t: Sequence[float],
                distance: np.ndarray, sigma: Optional[np.ndarray] = None,
                witnesses: Optional[np.ndarray] = None, pixels: Optional[np.ndarray] = None, *,
-               inferred: bool = False) -> None:
+               mask: Optional[np.ndarray] = None, inferred: bool = False) -> None:
         """tv_room_remove: removes a map that was added with equal arguments, exactly. Raises
         TV_ERR_ARGUMENT where the room holds no such map."""
-        self._fuse("tv_room_remove", camera, R, t, distance, sigma, witnesses, pixels, inferred)
+        self._fuse("tv_room_remove", camera, R, t, distance, sigma, witnesses, pixels, mask,
+                   inferred)
 
     def _fuse(self, function: str, camera: Camera, R: Any, t: Any, *arrays: Any) -> None:
         lens = camera_struct("camera", camera)
@@ -112,10 +115,12 @@ class Room:
     def see_through(self, camera: Camera, R: Sequence[Sequence[float]], t: Sequence[float],
                     distance: np.ndarray, sigma: Optional[np.ndarray] = None,
                     witnesses: Optional[np.ndarray] = None,
-                    pixels: Optional[np.ndarray] = None) -> None:
+                    pixels: Optional[np.ndarray] = None, *,
+                    mask: Optional[np.ndarray] = None) -> None:
         """tv_room_see_through: lets a map that is in the room see through what was added after it.
         Raises TV_ERR_ARGUMENT where the room holds no such map."""
-        self._fuse("tv_room_see_through", camera, R, t, distance, sigma, witnesses, pixels, False)
+        self._fuse("tv_room_see_through", camera, R, t, distance, sigma, witnesses, pixels, mask,
+                   False)
 
     def find_planes(self, options: Optional[RoomPlaneOptions] = None, *, max_planes: int = 64,
                     **keywords: Any) -> np.ndarray:
@@ -133,16 +138,17 @@ class Room:
     def infer(self, planes: np.ndarray, camera: Camera, R: Sequence[Sequence[float]],
               t: Sequence[float], distance: np.ndarray, sigma: Optional[np.ndarray] = None,
               witnesses: Optional[np.ndarray] = None, pixels: Optional[np.ndarray] = None, *,
-              options: Optional[RoomInferOptions] = None,
+              mask: Optional[np.ndarray] = None, options: Optional[RoomInferOptions] = None,
               **keywords: Any) -> tuple[np.ndarray, np.ndarray]:
         """tv_room_infer: distances and sigmas, (height, width) float32, of what a map lacks, along
-        planes that find_planes returned; 0 where nothing was inferred. pixels: not None. They are
-        for add(..., inferred=True), and then see_through with each measured map."""
+        planes that find_planes returned; 0 where nothing was inferred. pixels: not None. mask: as
+        for add; nothing is inferred where it is 0. They are for add(..., inferred=True), and then
+        see_through with each measured map."""
         wanted = to_struct(self.library, RoomInferOptions, options, keywords)
         planes = _abi.check_array("planes", planes, _abi.ROOM_PLANE)
         lens = camera_struct("camera", camera)
         rotation, translation = _abi.small_array("R", R, 3, 3), _abi.small_array("t", t, 3)
-        depth, kept = depth_map(self.library, distance, sigma, witnesses, pixels, False)
+        depth, kept = depth_map(self.library, distance, sigma, witnesses, pixels, mask, False)
         size, count = c_size_t(), c_int32()
         self.library.call("tv_room_infer_size", c_int32(depth.width), c_int32(depth.height),
                           byref(size))
@@ -198,16 +204,17 @@ class Room:
 
 def depth_map(library: _abi.Library, distance: np.ndarray, sigma: Optional[np.ndarray],
               witnesses: Optional[np.ndarray], pixels: Optional[np.ndarray],
-              inferred: bool) -> tuple[Any, list[np.ndarray]]:
+              mask: Optional[np.ndarray], inferred: bool) -> tuple[Any, list[np.ndarray]]:
     """The tv_depth_map of these arrays, and the arrays that have to live as long."""
     shape = np.shape(distance)
     if len(shape) != 2 or 0 in shape or max(shape) >= 2**31:
         raise ValueError(f"distance: shape (height, width) is expected, not {shape}")
     fields: dict[str, Any] = {"width": shape[1], "height": shape[0], "stride": shape[1],
-                              "inferred": int(inferred)}
+                              "mask_stride_bytes": shape[1], "inferred": int(inferred)}
     kept: list[np.ndarray] = []
     for name, array, dtype in (("distance", distance, np.float32), ("sigma", sigma, np.float32),
-                               ("witnesses", witnesses, np.uint8)):
+                               ("witnesses", witnesses, np.uint8),
+                               ("mask", _abi.mask_bytes(mask), np.uint8)):
         if array is None:
             continue
         if np.shape(array) != shape:

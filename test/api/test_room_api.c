@@ -171,6 +171,8 @@ static void test_a_map_is_refused(void) {
   expect_refusal(TV_ERR_ARGUMENT);
   map.pixel_stride_bytes = 3 * WIDTH - 1;
   expect_refusal(TV_ERR_ARGUMENT);
+  map.mask = pixels, map.mask_stride_bytes = WIDTH - 1;
+  expect_refusal(TV_ERR_ARGUMENT);
   map.height = HEIGHT - 1;
   expect_refusal(TV_ERR_CAMERA);
   camera.fx = 0;
@@ -186,7 +188,9 @@ static void test_a_map_is_refused(void) {
   TEST_ASSERT_EQUAL_INT(TV_OK, add());
   map.sigma = NULL, map.witnesses = NULL;
   TEST_ASSERT_EQUAL_INT(TV_OK, add());
-  expect_maps(2);
+  map.mask = pixels, map.mask_stride_bytes = 3 * WIDTH;
+  TEST_ASSERT_EQUAL_INT(TV_OK, add());
+  expect_maps(3);
 }
 
 static void test_what_is_not_in_the_room_is_not_removed(void) {
@@ -466,7 +470,9 @@ static void test_inference_is_refused_and_fills_the_wall(void) {
                         INFER(room, &map, &plane, 1, aligned, bytes, out_sigma, &num));
   TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
                         INFER(room, &map, &plane, 1, aligned, bytes, distance, &num));
-  map.inferred = 1;
+  map.mask = (const uint8_t *)out, map.mask_stride_bytes = WIDTH;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, INFER(room, &map, &plane, 1, aligned, bytes, out, &num));
+  map.mask = NULL, map.inferred = 1;
   TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, INFER(room, &map, &plane, 1, aligned, bytes, out, &num));
   map.inferred = 0, map.pixels = NULL;
   TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, INFER(room, &map, &plane, 1, aligned, bytes, out, &num));

@@ -45,11 +45,40 @@ void test_what_a_mask_leaves_out_does_not_count() {
   TEST_ASSERT_TRUE(half > 0.45 * all && half < 0.55 * all);
 }
 
+// What a map knows of a pixel says whether the picture shows it: what lies beyond its edge and
+// what the mask leaves out do not become plain walls, and do not darken their neighbours.
+void test_a_map_says_which_of_its_pixels_show_the_scene() {
+  cli::RoomPicture picture;
+  picture.luma.create(camera.height, camera.width, CV_8U);
+  cv::randu(picture.luma, 100, 200);
+  const cli::RoomPicture other = picture;
+  picture.mask = cv::Mat(camera.height, camera.width, CV_8U, cv::Scalar(255));
+  picture.mask.rowRange(100, camera.height) = 0;  // the vehicle
+  cli::RoomView here, beside;
+  beside.t = {0.1, 0, 0};
+  cli::DepthSweep sweep(camera);
+  cli::TileCounts tiles{};
+  cli::MapPixels map;
+  sweep.run({&here, &beside}, {&picture, &other}, 1, 10, tiles).unpack(map);
+  const int width = sweep.map_camera().width, height = sweep.map_camera().height;
+  TEST_ASSERT_EQUAL(width * height, map.shown.size());
+  const auto at = [width](int x, int y) { return static_cast<size_t>(y * width + x); };
+  // The map is so large that its corners are those of the picture, whose sides bend inwards.
+  TEST_ASSERT_EQUAL(0, map.shown[at(width / 2, 0)]);
+  TEST_ASSERT_EQUAL(0, map.shown[at(width / 2, height - 1)]);
+  TEST_ASSERT_EQUAL(255, map.shown[at(width / 2, height / 2)]);
+  for (size_t i = 0; i < map.shown.size(); ++i) {
+    TEST_ASSERT_TRUE(map.shown[i] != 0 || map.distance[i] == 0);
+    TEST_ASSERT_TRUE(map.shown[i] == 0 || map.rgb[3 * i] >= 95);
+  }
+}
+
 }  // namespace
 
 int main() {
   UNITY_BEGIN();
   RUN_TEST(test_what_lies_beyond_the_picture_is_no_plain_wall);
   RUN_TEST(test_what_a_mask_leaves_out_does_not_count);
+  RUN_TEST(test_a_map_says_which_of_its_pixels_show_the_scene);
   return UNITY_END();
 }

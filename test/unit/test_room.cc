@@ -637,6 +637,73 @@ void test_a_plane_is_not_carried_where_farther_things_were_measured() {
   TEST_ASSERT_EQUAL(0, num);
 }
 
+// A plain wall through a lens whose corners are black, with texture in stripes alone: the wall is
+// carried up to the edge of what the lens shows and not into the corners, which are plain as well.
+void test_a_plane_is_carried_to_the_edge_of_the_mask_and_no_farther() {
+  constexpr int kWidth = 160, kHeight = 120;
+  Map m = wall_at(2, Vec3(0, 0, 0), 0.02f);
+  const Map truth = m;
+  std::vector<uint8_t> mask(kWidth * kHeight);
+  const auto at = [](int x, int y) { return static_cast<size_t>(y * kWidth + x); };
+  const auto is_shown = [](int x, int y) {
+    const double dx = x - 79.5, dy = y - 59.5;
+    return dx * dx + dy * dy < 80.0 * 80.0;
+  };
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      const bool textured = x % 60 < 12;
+      mask[at(x, y)] = is_shown(x, y) ? 1 : 0;
+      const int grey = !is_shown(x, y) ? 0 : textured ? (x * 71 ^ y * 37) % 200 : 150;
+      for (size_t c = 0; c < 3; ++c) m.pixels[3 * at(x, y) + c] = static_cast<uint8_t>(grey);
+      if (!textured) m.distance[at(x, y)] = 0;
+    }
+  }
+  const auto aim = [&] {
+    box_room::aim(&m);
+    m.map.mask = mask.data();
+    m.map.mask_stride_bytes = kWidth;
+  };
+  aim();
+  tv_room* room = new_room();
+  TEST_ASSERT_EQUAL(TV_OK, add(room, m));
+  mesh(room);
+  const size_t measured = vertices.size();
+  const Planes planes = find_planes(room, false);
+  TEST_ASSERT_EQUAL(1, planes.num);
+  const auto expect_inferred = [&] {
+    int32_t num;
+    const Map inferred = infer(room, m, planes, &num);
+    int edge = 0, carried = 0;
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x) {
+        const float d = inferred.distance[at(x, y)];
+        TEST_ASSERT_TRUE(is_shown(x, y) || d == 0);
+        TEST_ASSERT_TRUE(d == 0 || std::fabs(d - truth.distance[at(x, y)]) < 0.02f);
+        // The shown pixels beside the edge, in a column without texture.
+        const bool beside = is_shown(x, y) && (!is_shown(x, y - 1) || !is_shown(x, y + 1));
+        if (!beside || x % 60 < 24 || x % 60 >= 48) continue;
+        ++edge, carried += d > 0;
+      }
+    }
+    TEST_ASSERT_TRUE(edge > 30);
+    TEST_ASSERT_EQUAL(edge, carried);
+  };
+  expect_inferred();
+  // Distances that a map claims where its mask is 0 are not read.
+  for (int k = 0; k < kWidth * kHeight; ++k)
+    if (mask[static_cast<size_t>(k)] == 0) m.distance[static_cast<size_t>(k)] = 1;
+  aim();
+  expect_inferred();
+  TEST_ASSERT_EQUAL(TV_OK, add(room, m));
+  mesh(room);
+  TEST_ASSERT_TRUE(vertices.size() < measured + measured / 8);
+  TEST_ASSERT_EQUAL(0, vertices_near(1));
+  m.map.mask = nullptr;  // another map
+  TEST_ASSERT_EQUAL(TV_ERR_ARGUMENT, remove(room, m));
+  aim();
+  TEST_ASSERT_EQUAL(TV_OK, remove(room, m));
+}
+
 void test_an_inferred_wall_that_a_map_sees_through_vanishes() {
   tv_room* room = new_room();
   Map inferred = wall_at(1, Vec3(0, 0, 0), 0.02f);
@@ -674,6 +741,7 @@ int main(void) {
   RUN_TEST(test_surface_on_a_plane_is_drawn_to_it_and_other_surface_stays);
   RUN_TEST(test_surface_of_a_large_sigma_is_left_out_when_wanted);
   RUN_TEST(test_a_plane_is_not_carried_where_farther_things_were_measured);
+  RUN_TEST(test_a_plane_is_carried_to_the_edge_of_the_mask_and_no_farther);
   RUN_TEST(test_an_inferred_wall_that_a_map_sees_through_vanishes);
   return UNITY_END();
 }

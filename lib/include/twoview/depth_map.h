@@ -75,7 +75,8 @@ typedef struct tv_depth_arrays {
   /* How many of the other views show there what the reference shows. 0 where the distance is not
      known, or where it follows from its surroundings alone, as on a plain wall. */
   uint8_t *witnesses;
-  /* The reference image as the map's camera would see it; 0 beyond its edges. Null: not wanted. */
+  /* The reference image as the map's camera would see it; 0 beyond its edges and nowhere else.
+     Null: not wanted. */
   uint8_t *grey;
 } tv_depth_arrays;
 

@@ -85,6 +85,12 @@ typedef struct tv_depth_map {
   /* 1: no view measured these distances, they were inferred (tv_room_infer). They make surface only
      where nothing was measured and two maps or more agree, and its vertices say so. Else 0. */
   int32_t inferred;
+  /* A byte a pixel, 0 where the image shows nothing of the scene: beyond the edge of its lens, on
+     an overlay, on the vehicle. The pixel is unknown there whatever its distance, and nothing is
+     inferred. Of a map of tv_sweep_depth its `grey` is such a mask. Null: all pixels show it. */
+  const uint8_t *mask;
+  /* Bytes from the start of a row of `mask` to the start of the next one; not read without it. */
+  int64_t mask_stride_bytes;
 } tv_depth_map;
 
 /* Writes zeros, and the size, into a struct of struct_size bytes; null is allowed. Programs call
@@ -337,10 +343,10 @@ TV_API tv_status tv_room_infer_size(int32_t width, int32_t height, size_t *size_
 
 /* Carries planes across what has no texture: the distances that a map lacks, of pixels in a region
    of its picture without texture, at whose edge or in which enough was measured on a plane, and
-   nothing farther away. Where several planes qualify, the nearest along the ray is seen. Where the
-   room has a measured surface, where a map saw through, and beyond a plane of a share_behind below
-   0.03, nothing is inferred.
-   room, camera, R, t, map: as for tv_room_add; the map needs `pixels` and was measured
+   nothing farther away. A region ends where the map's mask is 0, and where the camera has no ray.
+   Where several planes qualify, the nearest along the ray is seen. Where the room has a measured
+   surface, where a map saw through, and beyond a plane of a share_behind below 0.03, nothing is
+   inferred. room, camera, R, t, map: as for tv_room_add; the map needs `pixels` and was measured
    (TV_ERR_ARGUMENT). planes: num_planes of tv_room_find_planes.
    options: null means the defaults. memory: starts at a multiple of TV_CONTEXT_ALIGNMENT and has at
    least the bytes of tv_room_infer_size; free for other use after the call.

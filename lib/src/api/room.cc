@@ -38,6 +38,13 @@ tv_status read_options(const tv_room_options* given, tv_room_options* options) {
   return valid ? TV_OK : TV_ERR_ARGUMENT;
 }
 
+// Checks the rows of an image that lies on a map of this camera.
+tv_status check_rows(const tv_image& rows, const tv_camera& camera) {
+  tv_camera size = camera;
+  size.width = rows.width, size.height = rows.height;
+  return check_camera_image(size, rows);
+}
+
 tv_status check_map(const tv_depth_map& map, const tv_camera& camera) {
   if (map.distance == nullptr) return TV_ERR_NULL;
   const bool valid = within(map.width, 1, kMaxSide) && within(map.height, 1, kMaxSide) &&
@@ -45,11 +52,13 @@ tv_status check_map(const tv_depth_map& map, const tv_camera& camera) {
   if (!valid) return TV_ERR_ARGUMENT;
   if (map.pixels != nullptr) {
     if (map.channels != 1 && map.channels != 3) return TV_ERR_ARGUMENT;
-    const tv_image rows = {map.pixels, map.channels * map.width, map.height,
-                           map.pixel_stride_bytes};
-    tv_camera size = camera;
-    size.width = rows.width, size.height = rows.height;
-    const tv_status status = check_camera_image(size, rows);
+    const tv_status status = check_rows(
+        {map.pixels, map.channels * map.width, map.height, map.pixel_stride_bytes}, camera);
+    if (status != TV_OK) return status;
+  }
+  if (map.mask != nullptr) {
+    const tv_status status =
+        check_rows({map.mask, map.width, map.height, map.mask_stride_bytes}, camera);
     if (status != TV_OK) return status;
   }
   return map.width == camera.width && map.height == camera.height ? TV_OK : TV_ERR_CAMERA;
@@ -353,7 +362,9 @@ tv_status tv_room_infer(const tv_room* room, const tv_camera* camera, const doub
       static_cast<size_t>(view.map.width);
   const tv_image picture = {view.map.pixels, view.map.channels * view.map.width, view.map.height,
                             view.map.pixel_stride_bytes};
-  const tv::Bytes arrays[10] = {{distance, pixels * sizeof *distance},
+  const tv_image mask = {view.map.mask, view.map.width, view.map.height,
+                         view.map.mask_stride_bytes};
+  const tv::Bytes arrays[11] = {{distance, pixels * sizeof *distance},
                                 {sigma, pixels * sizeof *sigma},
                                 {num_pixels, sizeof *num_pixels},
                                 {memory, size_bytes},
@@ -362,8 +373,9 @@ tv_status tv_room_infer(const tv_room* room, const tv_camera* camera, const doub
                                 {view.map.distance, strided * sizeof(float)},
                                 {view.map.sigma, strided * sizeof(float)},
                                 {view.map.witnesses, strided},
-                                {view.map.pixels, tv::image_bytes(picture)}};
-  if (tv::outputs_overlap(arrays, 4, 10)) return TV_ERR_OVERLAP;
+                                {view.map.pixels, tv::image_bytes(picture)},
+                                {view.map.mask, tv::image_bytes(mask)}};
+  if (tv::outputs_overlap(arrays, 4, 11)) return TV_ERR_OVERLAP;
   tv::Arena arena = tv::arena_over(memory, size_bytes);
   *num_pixels = tv::infer_distances(*room, view, {planes, num_planes, checked.max_step}, arena,
                                     distance, sigma);

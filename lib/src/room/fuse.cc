@@ -4,6 +4,11 @@
 #include <cstring>
 
 namespace tv {
+
+bool shows_scene(const tv_depth_map& map, int32_t x, int32_t y) {
+  return map.mask == nullptr || map.mask[y * map.mask_stride_bytes + x] != 0;
+}
+
 namespace {
 
 // Without sigmas, a hundredth of the distance.
@@ -32,6 +37,7 @@ Measured measured_at(const Fusion& f, int32_t x, int32_t y) {
   const ptrdiff_t at = static_cast<ptrdiff_t>(y) * map.stride + x;
   const Measured unknown = {0, 0, 0};
   if (map.witnesses != nullptr && map.witnesses[at] == 0) return unknown;
+  if (!shows_scene(map, x, y)) return unknown;
   const double distance = static_cast<double>(map.distance[at]);
   if (!(distance > 0 && distance <= f.max_distance)) return unknown;
   const double sigma =
@@ -295,6 +301,7 @@ uint64_t digest_of(const RoomView& view) {
   digest = digest_rows(digest, map.distance, 4 * width, int64_t{4} * map.stride, map.height);
   digest = digest_rows(digest, map.sigma, 4 * width, int64_t{4} * map.stride, map.height);
   digest = digest_rows(digest, map.witnesses, width, map.stride, map.height);
+  digest = digest_rows(digest, map.mask, width, map.mask_stride_bytes, map.height);
   const size_t channels = map.pixels != nullptr ? static_cast<size_t>(map.channels) : 0;
   return digest_rows(digest, map.pixels, width * channels, map.pixel_stride_bytes, map.height);
 }

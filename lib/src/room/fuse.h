@@ -20,6 +20,9 @@ struct Measured {
   int32_t weight;
 };
 
+// Whether the image shows the scene at a pixel.
+bool shows_scene(const tv_depth_map& map, int32_t x, int32_t y);
+
 Measured measured_at(const tv_room& room, const RoomView& view, int32_t x, int32_t y);
 
 // A number that tells views apart by their contents.

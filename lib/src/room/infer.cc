@@ -26,7 +26,8 @@ constexpr double kMostBehindWall = 0.03;
 // The least cosine between the ray and the plane's normal: 80 degrees.
 constexpr double kLeastCosine = 0.17;
 
-enum State : uint8_t { kTextured, kPlain, kTaken };
+// kOutside: the image shows nothing of the scene there, or the camera has no ray.
+enum State : uint8_t { kTextured, kPlain, kTaken, kOutside };
 
 struct Picture {
   int32_t width, height;
@@ -36,18 +37,26 @@ struct Picture {
 };
 
 int32_t grey_at(const tv_depth_map& map, int32_t x, int32_t y) {
-  x = x < 0 ? 0 : x >= map.width ? map.width - 1 : x;
-  y = y < 0 ? 0 : y >= map.height ? map.height - 1 : y;
   const uint8_t* p = map.pixels + y * map.pixel_stride_bytes + map.channels * x;
   return map.channels == 1 ? p[0] : (77 * p[0] + 150 * p[1] + 29 * p[2] + 128) >> 8;
 }
 
-// The mean of 3 x 3 pixels, which takes two thirds of the noise.
+int32_t clamped(int32_t value, int32_t end) {
+  return value < 0 ? 0 : value >= end ? end - 1 : value;
+}
+
+// The mean of 3 x 3 pixels, which takes two thirds of the noise. What lies outside is left out: its
+// edge is none of the scene.
 void smooth(const tv_depth_map& map, const Picture& picture) {
   for (int32_t y = 0; y < map.height; ++y) {
     for (int32_t x = 0; x < map.width; ++x) {
+      const int32_t own = grey_at(map, x, y);
       int32_t sum = 4;
-      for (int32_t k = 0; k < 9; ++k) sum += grey_at(map, x + k % 3 - 1, y + k / 3 - 1);
+      for (int32_t k = 0; k < 9; ++k) {
+        const int32_t nx = clamped(x + k % 3 - 1, map.width);
+        const int32_t ny = clamped(y + k / 3 - 1, map.height);
+        sum += picture.state[ny * map.width + nx] == kOutside ? own : grey_at(map, nx, ny);
+      }
       picture.grey[y * map.width + x] = static_cast<uint8_t>(sum / 9);
     }
   }
@@ -59,11 +68,12 @@ void find_plain(const Picture& picture, int32_t max_step) {
   for (int32_t y = 0; y < h; ++y) {
     for (int32_t x = 0; x < w; ++x) {
       const int32_t at = y * w + x, grey = picture.grey[at];
+      if (picture.state[at] == kOutside) continue;
       const int32_t around[4] = {x > 0 ? at - 1 : at, x + 1 < w ? at + 1 : at, y > 0 ? at - w : at,
                                  y + 1 < h ? at + w : at};
       bool plain = true;
       for (const int32_t n : around) {
-        const int32_t step = picture.grey[n] - grey;
+        const int32_t step = picture.state[n] == kOutside ? 0 : picture.grey[n] - grey;
         plain = plain && step <= max_step && -step <= max_step;
       }
       picture.state[at] = plain ? kPlain : kTextured;
@@ -83,6 +93,15 @@ bool sight_at(const RoomView& view, int32_t at, Sight* sight) {
   const double d[3] = {ray[0], ray[1], ray[2]};
   rotate(view.rotation, d, sight->ray);
   return true;
+}
+
+void find_outside(const RoomView& view, const Picture& picture) {
+  for (int32_t at = 0; at < picture.width * picture.height; ++at) {
+    Sight sight;
+    const bool inside =
+        shows_scene(view.map, at % picture.width, at / picture.width) && sight_at(view, at, &sight);
+    picture.state[at] = inside ? kTextured : kOutside;
+  }
 }
 
 // Where the ray meets the plane from its free side; 0 where it does not, or at too small an angle.
@@ -212,6 +231,7 @@ int32_t infer_distances(const tv_room& room, const RoomView& view, const InferRe
   const size_t pixels = static_cast<size_t>(map.width) * static_cast<size_t>(map.height);
   Picture picture = {map.width, map.height, arena_alloc<uint8_t>(arena, pixels),
                      arena_alloc<uint8_t>(arena, pixels), arena_alloc<int32_t>(arena, pixels)};
+  find_outside(view, picture);
   smooth(map, picture);
   find_plain(picture, request.max_step);
   std::memset(distance, 0, pixels * sizeof *distance);

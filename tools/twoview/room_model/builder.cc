@@ -173,15 +173,17 @@ void RoomBuilder::run(const Job& job) {
 
 void RoomBuilder::fill(const Map& map, tv_depth_map& out) {
   const tv_camera& camera = sweep_.map_camera();
-  map.pixels.unpack(distance_, sigma_, rgb_);
+  map.pixels.unpack(pixels_);
   tv_depth_map_init(&out);
   out.width = out.stride = camera.width;
   out.height = camera.height;
-  out.distance = distance_.data();
-  out.sigma = sigma_.data();
-  out.pixels = rgb_.data();
+  out.distance = pixels_.distance.data();
+  out.sigma = pixels_.sigma.data();
+  out.pixels = pixels_.rgb.data();
   out.pixel_stride_bytes = 3 * static_cast<int64_t>(camera.width);
   out.channels = 3;
+  out.mask = pixels_.shown.data();
+  out.mask_stride_bytes = camera.width;
 }
 
 // False where the memory is full.
@@ -275,13 +277,13 @@ void RoomBuilder::infer(RoomModel& model) {
   size_t bytes = 0;
   check(tv_room_infer_size(camera.width, camera.height, &bytes), "the plain walls");
   std::vector<uint8_t> memory(bytes + TV_CONTEXT_ALIGNMENT);
-  std::vector<float> distance(distance_.size()), sigma(distance_.size());
+  std::vector<float> distance(pixels_.distance.size()), sigma(pixels_.distance.size());
   for (const Map& map : maps_) {
     const RoomView& view = scene_.views[map.view];
     tv_depth_map given;
     fill(map, given);
-    distance.resize(distance_.size());
-    sigma.resize(distance_.size());
+    distance.resize(pixels_.distance.size());
+    sigma.resize(pixels_.distance.size());
     int32_t num_pixels = 0;
     check(tv_room_infer(room_, &camera, view.R.data(), view.t.data(), &given, model.planes.data(),
                         static_cast<int32_t>(model.planes.size()), nullptr, aligned(memory), bytes,
@@ -338,15 +340,16 @@ void RoomBuilder::add_page_mesh(RoomModel& model) {
 void RoomBuilder::add_depth_maps(RoomModel& model) {
   const tv_camera& camera = sweep_.map_camera();
   for (const Map& map : maps_) {
-    map.pixels.unpack(distance_, sigma_, rgb_);
+    map.pixels.unpack(pixels_);
     for (int y = 0, i = 0; y < camera.height; ++y) {
       for (int x = 0; x < camera.width; ++x, ++i) {
         const double u = (x - camera.cx) / camera.fx, v = (y - camera.cy) / camera.fy;
-        distance_[static_cast<size_t>(i)] /= static_cast<float>(std::sqrt(1 + u * u + v * v));
+        pixels_.distance[static_cast<size_t>(i)] /=
+            static_cast<float>(std::sqrt(1 + u * u + v * v));
       }
     }
     const RoomView& view = scene_.views[map.view];
-    model.depth_maps.push_back({view.index, view.name, distance_});
+    model.depth_maps.push_back({view.index, view.name, pixels_.distance});
   }
 }
 
@@ -373,12 +376,12 @@ void RoomBuilder::add_free_area(RoomModel& model) {
   FreeArea area(model);
   for (const Map& map : maps_) {
     const RoomView& view = scene_.views[map.view];
-    map.pixels.unpack(distance_, sigma_, rgb_);
+    map.pixels.unpack(pixels_);
     for (int y = 0; y < camera.height; y += kStep) {
       for (int x = 0; x < camera.width; x += kStep) {
         const double distance = static_cast<double>(
-            distance_[static_cast<size_t>(y) * static_cast<size_t>(camera.width) +
-                      static_cast<size_t>(x)]);
+            pixels_.distance[static_cast<size_t>(y) * static_cast<size_t>(camera.width) +
+                             static_cast<size_t>(x)]);
         if (!(distance > 0)) continue;
         Vector3 ray{(x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy, 1};
         const double scale = distance / norm(ray);

@@ -73,8 +73,7 @@ class RoomBuilder {
   std::vector<int> uses_;                   // by how many jobs that are open a view is needed
   std::map<size_t, RoomPicture> pictures_;  // by view
   std::vector<Map> maps_;
-  std::vector<float> distance_, sigma_;  // of the map that is in work
-  std::vector<uint8_t> rgb_;
+  MapPixels pixels_;                     // of the map that is in work
   std::map<size_t, TileCounts> counts_;  // by view
   int num_without_ = 0, num_missing_ = 0;
   double ms_depth_ = 0, ms_fusion_ = 0;

@@ -46,29 +46,30 @@ uint8_t* aligned(std::vector<uint8_t>& memory) {
   return memory.data() + (over == 0 ? 0 : TV_CONTEXT_ALIGNMENT - over);
 }
 
-KnownPixels::KnownPixels(const std::vector<float>& distance, const std::vector<float>& sigma,
-                         const std::vector<uint8_t>& rgb)
-    : is_known_(distance.size()), rgb_(rgb) {
-  for (size_t i = 0; i < distance.size(); ++i) {
-    if (!(distance[i] > 0)) continue;
+KnownPixels::KnownPixels(const MapPixels& pixels)
+    : is_known_(pixels.distance.size()), is_shown_(pixels.distance.size()), rgb_(pixels.rgb) {
+  for (size_t i = 0; i < is_known_.size(); ++i) {
+    is_shown_[i] = pixels.shown[i] != 0;
+    if (!(pixels.distance[i] > 0)) continue;
     is_known_[i] = true;
-    distance_.push_back(distance[i]);
-    sigma_.push_back(sigma[i]);
+    distance_.push_back(pixels.distance[i]);
+    sigma_.push_back(pixels.sigma[i]);
   }
   distance_.shrink_to_fit();
   sigma_.shrink_to_fit();
 }
 
-void KnownPixels::unpack(std::vector<float>& distance, std::vector<float>& sigma,
-                         std::vector<uint8_t>& rgb) const {
-  distance.assign(is_known_.size(), 0);
-  sigma.assign(is_known_.size(), 0);
-  rgb = rgb_;
+void KnownPixels::unpack(MapPixels& pixels) const {
+  pixels.distance.assign(is_known_.size(), 0);
+  pixels.sigma.assign(is_known_.size(), 0);
+  pixels.shown.resize(is_known_.size());
+  pixels.rgb = rgb_;
   size_t next = 0;
   for (size_t i = 0; i < is_known_.size(); ++i) {
+    pixels.shown[i] = is_shown_[i] ? 255 : 0;
     if (!is_known_[i]) continue;
-    distance[i] = distance_[next];
-    sigma[i] = sigma_[next];
+    pixels.distance[i] = distance_[next];
+    pixels.sigma[i] = sigma_[next];
     ++next;
   }
 }
@@ -82,11 +83,11 @@ DepthSweep::DepthSweep(const tv_camera& camera, const tv_depth_options& options)
   memory_.resize(memory_bytes_ + TV_CONTEXT_ALIGNMENT);
   const int width = map_camera_.width, height = map_camera_.height;
   const size_t count = static_cast<size_t>(width) * static_cast<size_t>(height);
-  distance_.resize(count);
-  sigma_.resize(count);
+  pixels_.distance.resize(count);
+  pixels_.sigma.resize(count);
   witnesses_.resize(count);
   grey_.resize(count);
-  rgb_.resize(3 * count);
+  pixels_.rgb.resize(3 * count);
   // A picture is reduced by area averaging before it is sampled: single pixels of a large one would
   // be noise.
   const double scale = std::min(1.0, map_camera_.fx / camera_.fx);
@@ -110,7 +111,9 @@ DepthSweep::DepthSweep(const tv_camera& camera, const tv_depth_options& options)
 void DepthSweep::bring_to_map(const cv::Mat& picture, cv::Mat& out, int interpolation) const {
   cv::Mat small = picture;
   if (picture.size() != reduced_) cv::resize(picture, small, reduced_, 0, 0, cv::INTER_AREA);
-  cv::remap(small, out, map_x_, map_y_, interpolation, cv::BORDER_CONSTANT);
+  // A mask is 0 beyond the picture. Levels go on there, so that its edge does not darken pixels.
+  cv::remap(small, out, map_x_, map_y_, interpolation,
+            interpolation == cv::INTER_NEAREST ? cv::BORDER_CONSTANT : cv::BORDER_REPLICATE);
 }
 
 cv::Mat DepthSweep::shown_by(const RoomPicture& picture) const {
@@ -132,31 +135,34 @@ KnownPixels DepthSweep::run(const std::vector<const RoomView*>& views,
   }
   options_.near_depth = near_depth;
   options_.far_depth = far_depth;
-  const tv_depth_arrays arrays{distance_.data(), sigma_.data(), witnesses_.data(), grey_.data()};
+  const tv_depth_arrays arrays{pixels_.distance.data(), pixels_.sigma.data(), witnesses_.data(),
+                               grey_.data()};
   check(tv_sweep_depth(swept.data(), static_cast<int32_t>(swept.size()), &options_,
                        aligned(memory_), memory_bytes_, &arrays),
         "the depth of " + views[0]->name);
   const RoomPicture& picture = *pictures[0];
   const cv::Size size(map_camera_.width, map_camera_.height);
-  cv::Mat bgr, rgb(size, CV_8UC3, rgb_.data());
+  cv::Mat bgr, rgb(size, CV_8UC3, pixels_.rgb.data());
   bring_to_map(picture.colour.empty() ? picture.luma : picture.colour, bgr, cv::INTER_LINEAR);
   cv::cvtColor(bgr, rgb, bgr.channels() == 1 ? cv::COLOR_GRAY2RGB : cv::COLOR_BGR2RGB);
   const cv::Mat shown = shown_by(picture);
+  pixels_.shown.assign(shown.data, shown.data + shown.total());
   const cv::Mat textured = texture_of(cv::Mat(size, CV_8U, grey_.data()));
-  for (size_t i = 0; i < distance_.size(); ++i) {
+  for (size_t i = 0; i < pixels_.distance.size(); ++i) {
     PixelCounts& counts = tiles[tile_of(i)];
+    float& distance = pixels_.distance[i];
     if (shown.data[i] == 0) {
-      distance_[i] = 0;
-    } else if (witnesses_[i] >= kFewestWitnesses && distance_[i] > 0) {
+      distance = 0;
+    } else if (witnesses_[i] >= kFewestWitnesses && distance > 0) {
       ++counts.measured;
     } else {
       ++(textured.data[i] == 0 ? counts.no_texture
-         : distance_[i] > 0    ? counts.unconfirmed
+         : distance > 0        ? counts.unconfirmed
                                : counts.ambiguous);
-      distance_[i] = 0;
+      distance = 0;
     }
   }
-  return KnownPixels(distance_, sigma_, rgb_);
+  return KnownPixels(pixels_);
 }
 
 void DepthSweep::count_unmapped(const RoomPicture& picture, TileCounts& tiles) {

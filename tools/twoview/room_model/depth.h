@@ -18,20 +18,23 @@ struct RoomPicture {
   cv::Mat mask;    // of the size of luma, 0 where it shows no scene; empty: all of it does
 };
 
+// What is known of each pixel of a map, row by row.
+struct MapPixels {
+  std::vector<float> distance, sigma;  // 0 where unknown
+  // Red, green, blue: also of pixels without a distance, because planes are carried across them.
+  std::vector<uint8_t> rgb;
+  std::vector<uint8_t> shown;  // 0 where the picture shows nothing of the scene
+};
+
 // A map, of whose pixels without a distance only the colours take memory.
 class KnownPixels {
  public:
-  // distance, sigma: `count` each, 0 where unknown. rgb: three times as many bytes.
-  KnownPixels(const std::vector<float>& distance, const std::vector<float>& sigma,
-              const std::vector<uint8_t>& rgb);
-  // Restores the three arrays; rgb has the colours of all pixels, also of those without a distance,
-  // because planes are carried across them.
-  void unpack(std::vector<float>& distance, std::vector<float>& sigma,
-              std::vector<uint8_t>& rgb) const;
+  explicit KnownPixels(const MapPixels& pixels);
+  void unpack(MapPixels& pixels) const;
   size_t num_known() const { return distance_.size(); }
 
  private:
-  std::vector<bool> is_known_;
+  std::vector<bool> is_known_, is_shown_;
   std::vector<float> distance_, sigma_;
   std::vector<uint8_t> rgb_;
 };
@@ -73,8 +76,8 @@ class DepthSweep {
   size_t memory_bytes_ = 0;
   cv::Mat map_x_, map_y_;  // where the reduced picture shows each pixel of the map
   cv::Size reduced_;       // size to which a picture is reduced before it is sampled
-  std::vector<float> distance_, sigma_;
-  std::vector<uint8_t> witnesses_, grey_, rgb_;
+  MapPixels pixels_;
+  std::vector<uint8_t> witnesses_, grey_;
 };
 
 // The first address of `memory` that the library's contexts may start at; `memory` has

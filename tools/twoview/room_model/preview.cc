@@ -92,19 +92,21 @@ void RoomPreview::add(const PreviewKey& key, const std::vector<PreviewPlace>& pl
 
 // Adds the map to the room, or removes it.
 tv_status RoomPreview::with_room(const Map& map, const PreviewPlace& place, bool adds) {
-  map.pixels.unpack(distance_, sigma_, rgb_);
+  map.pixels.unpack(pixels_);
   const auto scale = static_cast<float>(place.scale);
-  for (float& value : distance_) value *= scale;
-  for (float& value : sigma_) value *= scale;
+  for (float& value : pixels_.distance) value *= scale;
+  for (float& value : pixels_.sigma) value *= scale;
   tv_depth_map given;
   tv_depth_map_init(&given);
   given.width = given.stride = map.camera.width;
   given.height = map.camera.height;
-  given.distance = distance_.data();
-  given.sigma = sigma_.data();
-  given.pixels = rgb_.data();
+  given.distance = pixels_.distance.data();
+  given.sigma = pixels_.sigma.data();
+  given.pixels = pixels_.rgb.data();
   given.pixel_stride_bytes = 3 * static_cast<int64_t>(map.camera.width);
   given.channels = 3;
+  given.mask = pixels_.shown.data();
+  given.mask_stride_bytes = map.camera.width;
   return (adds ? tv_room_add : tv_room_remove)(room_, &map.camera, place.R.data(), place.t.data(),
                                                &given);
 }

@@ -68,8 +68,7 @@ class RoomPreview {
   std::unique_ptr<DepthSweep> sweep_;
   tv_camera camera_{};  // that sweep_ was made for
   std::vector<std::unique_ptr<Map>> maps_;
-  std::vector<float> distance_, sigma_;
-  std::vector<uint8_t> rgb_;
+  MapPixels pixels_;  // of the map that is in work
 };
 
 }  // namespace cli

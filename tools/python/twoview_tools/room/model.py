@@ -90,10 +90,10 @@ def make(flight, settings=Settings(), depth_of=depth_of):
                    truncation_voxels=TRUNCATION_VOXELS)
     keyframes, spent_depth, spent_fusion = [], 0.0, 0.0
 
-    def add(pose, *arrays, **keywords):
+    def add(pose, arrays):
         while True:
             try:
-                room.add(*pose, *arrays, **keywords)
+                room.add(*pose, *arrays, mask=arrays[3])
                 return
             except tv.TV_ERR_CAPACITY:
                 room.coarsen()
@@ -106,9 +106,10 @@ def make(flight, settings=Settings(), depth_of=depth_of):
             continue
         begin = time.process_time()
         measured = np.where(found.witnesses >= LEAST_WITNESSES, found.distance, 0)
+        # grey is 0 where the lens shows nothing, which makes it the mask as well
         arrays = (measured, found.sigma, found.witnesses, found.grey)
         pose = (found.camera, flight.R[index], flight.centres[index])
-        add(pose, *arrays)
+        add(pose, arrays)
         spent_fusion += time.process_time() - begin
         keyframes.append((index, pose, arrays))
     begin = time.process_time()
@@ -117,7 +118,7 @@ def make(flight, settings=Settings(), depth_of=depth_of):
         seen = 0
         for _, pose, arrays in keyframes:
             try:
-                room.see_through(*pose, *arrays)
+                room.see_through(*pose, *arrays, mask=arrays[3])
                 seen += 1
             except tv.TV_ERR_ARGUMENT:
                 pass  # fixed by a coarser voxel
@@ -127,7 +128,7 @@ def make(flight, settings=Settings(), depth_of=depth_of):
     planes = room.find_planes()
     if not settings.measured_only and all_see:
         for _, pose, arrays in keyframes:
-            distance, sigma = room.infer(planes, *pose, *arrays)
+            distance, sigma = room.infer(planes, *pose, *arrays, mask=arrays[3])
             if distance.any():
                 try:
                     room.add(*pose, distance, sigma, inferred=True)
