@@ -140,6 +140,10 @@ def test_a_mask_leaves_a_part_of_the_frames_out(frames):
     with tv.Odometry(CAMERA, max_keypoints=800) as odometry:
         states = [odometry.track(frame, i / 30, mask=mask) for i, frame in enumerate(frames)]
         assert states[-1].status == tv.OdometryStatus.TRACKING
+        assert states[-1].map_reasons == tv.MapReason(0)
+        begun = next(s for s in states if s.R is not None)
+        assert begun.map_reasons == tv.MapReason.UNCONFIRMED
+        assert begun.reasons == tv.Reason.LOW_PARALLAX
         assert odometry.last_frame()["x"].max() < 221
         assert odometry.still_mask().all() and states[-1].still_share == 0
         with pytest.raises(ValueError, match="mask"):

@@ -37,8 +37,8 @@ from .camera_files import (FILM, PLAIN_FILE, CalibrationSigmas, CameraFileWarnin
 from .context import Context
 from .dense import densify
 from .depth_map import DepthMap, sweep_depth
-from .enums import (CameraModel, Kernels, Kind, Loss, Normalisation, OdometryStatus, Orientation,
-                    PointStatus, Purpose, Reason, RoomPlaneKind, ScaleSource, Solver,
+from .enums import (CameraModel, Kernels, Kind, Loss, MapReason, Normalisation, OdometryStatus,
+                    Orientation, PointStatus, Purpose, Reason, RoomPlaneKind, ScaleSource, Solver,
                     Stage, Status, Triangulation, Verdict)
 from .odometry import Keyframe, Odometry, OdometryState
 from .options import (AbsolutePoseOptions, BundleOptions, DenseOptions, DepthOptions,
@@ -76,7 +76,8 @@ __all__ = [
     "DENSE_POINT", "DESCRIPTOR_BYTES", "DISTANCE_PRIOR", "DenseOptions", "DepthMap",
     "DepthOptions", "EstimateOptions", "FILM", "FeatureOptions", "FormatError",
     "GRAVITY_PRIOR", "GuidedOptions", "KEYPOINT", "Kernels", "Keyframe", "Kind", "Library",
-    "Loss", "MAP_OBSERVATION", "MAP_POINT", "MatchOptions", "Normalisation", "OBSERVATION",
+    "Loss", "MAP_OBSERVATION", "MAP_POINT", "MapReason", "MatchOptions", "Normalisation",
+    "OBSERVATION",
     "Odometry", "OdometryOptions", "OdometryState", "OdometryStatus", "Orientation",
     "PLAIN_FILE", "POINT", "POSE_PRIOR", "PointStatus", "Purpose", "ROOM_DEFAULT_BYTES",
     "ROOM_PLANE", "ROOM_VERTEX", "Reason", "Reconstruction", "Room", "RoomInferOptions",

@@ -256,7 +256,8 @@ class tv_odometry_state(Structure):
                 ("scale_contradicted", c_int32), ("scale_sigma", c_double),
                 ("principal_point_shift_px", c_double * 2), ("height_scale", c_double),
                 ("height_scale_sigma", c_double), ("velocity_scale", c_double),
-                ("velocity_scale_sigma", c_double), ("still_share", c_double)]
+                ("velocity_scale_sigma", c_double), ("still_share", c_double),
+                ("map_reasons", c_uint32), ("reserved_end", c_uint32)]
 
 
 class tv_keyframe(Structure):

@@ -139,6 +139,15 @@ class OdometryStatus(IntEnum):
     LOST = 4
 
 
+class MapReason(IntFlag):
+    UNCONFIRMED = 1 << 0
+    CONTRADICTED = 1 << 1
+    ONE_PLANE = 1 << 2
+    JUMPED = 1 << 3
+    UNSURE_ATTITUDE = 1 << 4
+    VELOCITIES_DISAGREE = 1 << 5
+
+
 class ScaleSource(IntEnum):
     UNIT = 0
     HEIGHT = 1
@@ -160,5 +169,6 @@ C_PREFIXES = {
     Reason: "TV_REASON_",
     Triangulation: "TV_TRIANGULATION_", PointStatus: "TV_POINT_", Loss: "TV_LOSS_",
     OdometryStatus: "TV_ODOMETRY_", ScaleSource: "TV_SCALE_",
+    MapReason: "TV_MAP_REASON_",
     RoomPlaneKind: "TV_ROOM_PLANE_",
 }

@@ -11,7 +11,7 @@ import numpy as np
 
 from . import _abi
 from .camera import Camera, camera_struct
-from .enums import OdometryStatus, Reason, ScaleSource
+from .enums import MapReason, OdometryStatus, Reason, ScaleSource
 from .options import OdometryOptions, to_struct
 
 
@@ -49,6 +49,7 @@ class OdometryState:
     height_scale: Optional[tuple[float, float]]  #: metres per unit, and sigma, by heights alone
     velocity_scale: Optional[tuple[float, float]]  #: the same by velocities alone
     still_share: float  #: of the picture: stands still while the scene moves, and is left out
+    map_reasons: MapReason  #: what the odometry has against its own map
 
 
 @dataclass(frozen=True)
@@ -259,4 +260,4 @@ def _state(s: Any) -> OdometryState:
         _matrix(s.principal_point_shift_px, 2), bool(s.scale_contradicted),
         (s.height_scale, s.height_scale_sigma) if s.height_scale_sigma > 0 else None,
         (s.velocity_scale, s.velocity_scale_sigma) if s.velocity_scale_sigma > 0 else None,
-        s.still_share)
+        s.still_share, MapReason(s.map_reasons))

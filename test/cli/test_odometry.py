@@ -131,6 +131,13 @@ class OdometryTest(CliTest):
         for row in rows:
             self.assertIn(row["status"], result["status_counts"])
             self.assertIn(row["pose"], ("tracked", "located"))
+            # Reasons of the map are the odometry's own, each in the words of a verdict, too.
+            words = {"unconfirmed": "low_parallax", "contradicted": "two_planar_solutions",
+                     "one_plane": "two_planar_solutions", "jumped": "low_parallax",
+                     "unsure_attitude": "low_parallax", "velocities_disagree": "second_motion"}
+            self.assertLessEqual({words[reason] for reason in row["map_reasons"].split()},
+                                 set(row["reasons"].split()))
+        self.assertIn("unconfirmed", {row["map_reasons"] for row in rows}, "as a segment begins")
         self.assertEqual(sum(int(row["is_keyframe"]) for row in rows), result["num_keyframes"])
         for key in ("mean", "median", "p99", "max"):
             self.assertGreater(result["time_ms"][key], 0)

@@ -45,7 +45,7 @@ LAYOUT(tv_distance_prior, 24, sigma, 16);
 LAYOUT(tv_window_options, 40, reserved, 36);
 LAYOUT(tv_window_result, 80, noise_px, 72);
 LAYOUT(tv_odometry_options, 40, reserved, 36);
-LAYOUT(tv_odometry_state, 624, still_share, 616);
+LAYOUT(tv_odometry_state, 632, reserved_end, 628);
 LAYOUT(tv_keyframe, 128, num_observations, 124);
 LAYOUT(tv_map_point, 112, covariance, 40);
 LAYOUT(tv_map_observation, 24, reserved, 20);

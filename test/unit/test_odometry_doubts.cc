@@ -21,7 +21,7 @@ void test_the_frame_that_ends_a_doubt_is_in_doubt() {
     const uint32_t doubts = odometry->doubts;
     const tv_odometry_state state = track_room(odometry, n);
     if (state.status != TV_ODOMETRY_TRACKING && state.status != TV_ODOMETRY_WEAK) continue;
-    TEST_ASSERT_EQUAL_UINT32(doubts, state.reasons & doubts);
+    TEST_ASSERT_EQUAL_UINT32(doubts, state.map_reasons & doubts);
     num_ended += doubts != 0 && odometry->doubts == 0;
   }
   TEST_ASSERT_TRUE(num_ended > 0);
@@ -47,6 +47,8 @@ void test_frames_are_in_doubt_after_keyframes_that_nothing_confirmed() {
     TEST_ASSERT_EQUAL_INT(num_unconfirmed < 3 ? TV_ODOMETRY_TRACKING : TV_ODOMETRY_WEAK,
                           state.status);
     TEST_ASSERT_EQUAL_UINT32(num_unconfirmed < 3 ? 0 : TV_REASON_LOW_PARALLAX, state.reasons);
+    TEST_ASSERT_EQUAL_UINT32(num_unconfirmed < 3 ? 0 : TV_MAP_REASON_UNCONFIRMED,
+                             state.map_reasons);
     while (!state.is_keyframe) state = track_room(odometry, ++n);
     TEST_ASSERT_EQUAL_UINT32(num_unconfirmed < 3 ? 0 : TV_REASON_LOW_PARALLAX, state.reasons);
     TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_TRACKING, track_room(odometry, ++n).status);  // confirmed now
@@ -83,7 +85,10 @@ void test_a_map_that_is_removed_says_nothing_of_the_scale() {
   odometry->velocity_trust = odometry->num_contrary = 100;
   odometry->travel.is_known = true;
   odometry->travel.way_m[0] = 10;
-  TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_LOST, track_room(odometry, ++n, false, 0.01).status);
+  const tv_odometry_state lost = track_room(odometry, ++n, false, 0.01);
+  TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_LOST, lost.status);
+  TEST_ASSERT_EQUAL_UINT32(TV_MAP_REASON_VELOCITIES_DISAGREE, lost.map_reasons);
+  TEST_ASSERT_EQUAL_UINT32(TV_REASON_SECOND_MOTION, lost.reasons);
   TEST_ASSERT_EQUAL_INT(num - kWrong, map.num_keyframes);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 2, known_scale());
 }
@@ -105,6 +110,7 @@ void test_the_frame_after_a_large_adjustment_is_weak() {
     tv_odometry_state state = track_room(odometry, ++n);
     TEST_ASSERT_EQUAL_INT(is_large ? TV_ODOMETRY_WEAK : TV_ODOMETRY_TRACKING, state.status);
     TEST_ASSERT_EQUAL_UINT32(is_large ? TV_REASON_LOW_PARALLAX : 0, state.reasons);
+    TEST_ASSERT_EQUAL_UINT32(is_large ? TV_MAP_REASON_JUMPED : 0, state.map_reasons);
     TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_TRACKING, track_room(odometry, ++n).status);
   }
 }
@@ -128,6 +134,8 @@ void test_frames_are_weak_while_the_keyframes_turns_are_unsure_together() {
       TEST_ASSERT_EQUAL_INT(drift_deg < 1.5 ? TV_ODOMETRY_TRACKING : TV_ODOMETRY_WEAK,
                             state.status);
       TEST_ASSERT_EQUAL_UINT32(drift_deg < 1.5 ? 0 : TV_REASON_LOW_PARALLAX, state.reasons);
+      TEST_ASSERT_EQUAL_UINT32(drift_deg < 1.5 ? 0 : TV_MAP_REASON_UNSURE_ATTITUDE,
+                               state.map_reasons);
     }
   }
   odometry->drift_sq = 1;

@@ -44,6 +44,39 @@ typedef enum tv_odometry_status {
    The string is constant and never freed. Thread-safe. */
 TV_API const char *tv_odometry_status_string(tv_odometry_status status);
 
+/* What the odometry has against its own map, and so against the pose of a frame, and what a program
+   that flies by the poses does about it. With each of them but for UNSURE_ATTITUDE the position is
+   not to be flown by as long as it lasts: hold the height and the attitude by the vehicle's own
+   sensors. The values are bits of tv_odometry_state.map_reasons. */
+typedef enum tv_map_reason {
+  /* Nothing has confirmed the two keyframes yet that the segment began with, or the last four
+     keyframes. What to do: move on slowly and sideways, with texture in view, until the next
+     keyframes agree with earlier ones. */
+  TV_MAP_REASON_UNCONFIRMED = 1 << 0,
+  /* Pairs of keyframes, or the velocities, contradicted the map. In that frame the pose was lost
+     and what was made since the last confirmed keyframe was removed; the frames that follow have
+     this reason until a keyframe is confirmed. What to do: discard the poses of the frames since
+     that keyframe, stop, and turn back to what was in view before. */
+  TV_MAP_REASON_CONTRADICTED = 1 << 1,
+  /* Pairs of keyframes see one plane, which two motions explain. What to do: bring into view what
+     lies off that plane, or move along it until a pair tells the two motions apart. */
+  TV_MAP_REASON_ONE_PLANE = 1 << 2,
+  /* A loop at this frame, or the map's adjustment since the frame before, moved the camera by 3 per
+     cent of the path or by 0.05 radians: the path jumps here, in this frame alone. What to do: take
+     no velocity from the two frames; begin a filter's position anew at this one, and read earlier
+     positions that are still in use again (tv_odometry_pose_of). */
+  TV_MAP_REASON_JUMPED = 1 << 3,
+  /* The attitudes of the keyframes since the segment began, or its last loop closed, are uncertain
+     by 1.5 degrees together. What to do: take the heading from elsewhere, and return to a place
+     that was seen before, so that a loop closes; short ways from frame to frame remain right. */
+  TV_MAP_REASON_UNSURE_ATTITUDE = 1 << 4,
+  /* The camera moved otherwise in the map than the velocities say: the map may follow something
+     that moves. Where it goes on, the pose is lost and what was made since the last confirmed
+     keyframe is removed. What to do: fly by the velocities, and turn the camera to what stands
+     still. */
+  TV_MAP_REASON_VELOCITIES_DISAGREE = 1 << 5
+} tv_map_reason;
+
 /* Where the unit of a map's lengths comes from. */
 typedef enum tv_scale_source {
   /* Nothing metric is known: the first two keyframes are at the distance 1. */
@@ -136,14 +169,11 @@ typedef struct tv_odometry_state {
   uint32_t struct_size;
   /* A tv_odometry_status. */
   int32_t status;
-  /* The bits of tv_reason that make the frame weak, or that keep the map from starting.
-     TV_REASON_LOW_PARALLAX: nothing had confirmed the two keyframes yet that the segment began
-     with, or the last four keyframes, when the frame was tracked; or a loop at this frame, or the
-     map's adjustment since the frame before, moved the camera by 3 per cent of the path or 0.05
-     radians, so that the path jumps here; or the attitudes of the keyframes since the segment
-     began, or its last loop closed, are uncertain by 1.5 degrees together. TV_REASON_SECOND_MOTION:
-     the camera moved otherwise in the map than the velocities say, so that the map may follow
-     something that moves. */
+  /* The bits of tv_reason that make the frame weak, or that keep the map from starting. Those of
+     the frame's own matches are as in tv_absolute_pose.reasons and tv_two_view.reasons, and a frame
+     whose attitude alone is known has TV_REASON_PURE_ROTATION. map_reasons adds
+     TV_REASON_LOW_PARALLAX (unconfirmed, jumped, unsure attitude), TV_REASON_TWO_PLANAR_SOLUTIONS
+     (contradicted, one plane) and TV_REASON_SECOND_MOTION (velocities disagree). */
   uint32_t reasons;
   /* Which segment the pose belongs to, from 0; -1 where no pose is known. A segment is a stretch
      within one frame of coordinates: poses of different segments do not compare. */
@@ -209,6 +239,11 @@ typedef struct tv_odometry_state {
      (on-screen text, a frame, a watermark, the vehicle's own legs), and of which the next frame
      takes no keypoints: tv_odometry_still_mask. */
   double still_share;
+  /* The tv_map_reason bits of a frame that is weak or lost: what the odometry has against its map.
+     0 where all reasons are of the frame's own matches, and of tv_odometry_locate. */
+  uint32_t map_reasons;
+  /* Always 0. */
+  uint32_t reserved_end;
 } tv_odometry_state;
 
 /* Writes zeros, and the size, into a struct of struct_size bytes; null is allowed. Programs call

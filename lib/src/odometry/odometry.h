@@ -173,8 +173,9 @@ struct tv_odometry {
   tv::Spread spread;
   bool took_step;  // a step of `spread` was taken before this frame was tracked
   tv::MapCheck check;
-  // The last keyframe that its own matches with earlier ones confirmed. Doubts: the reasons of the
-  // frames of a segment since some saw one plane only, or contradicted the map, or since it began.
+  // The last keyframe that its own matches with earlier ones confirmed. Doubts: the tv_map_reason
+  // of the frames of a segment since some saw one plane only, or contradicted the map, or since it
+  // began.
   int32_t confirmed_id;
   uint32_t doubts;
   int32_t doubtful_segment;

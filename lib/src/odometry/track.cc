@@ -147,14 +147,26 @@ void take_keyframe(const Odometry& odometry, int32_t idx, Frame* frame) {
   std::copy_n(seen_by(odometry.map, keyframe), frame->num, frame->points);
 }
 
+// The reasons of a frame that those against the map stand for.
+uint32_t reasons_of(uint32_t map_reasons) {
+  constexpr uint32_t kParallax =
+      TV_MAP_REASON_UNCONFIRMED | TV_MAP_REASON_JUMPED | TV_MAP_REASON_UNSURE_ATTITUDE;
+  constexpr uint32_t kPlanar = TV_MAP_REASON_CONTRADICTED | TV_MAP_REASON_ONE_PLANE;
+  uint32_t reasons = 0;
+  if ((map_reasons & kParallax) != 0) reasons |= TV_REASON_LOW_PARALLAX;
+  if ((map_reasons & kPlanar) != 0) reasons |= TV_REASON_TWO_PLANAR_SOLUTIONS;
+  if ((map_reasons & TV_MAP_REASON_VELOCITIES_DISAGREE) != 0) reasons |= TV_REASON_SECOND_MOTION;
+  return reasons;
+}
+
 // The segment's frames have this reason until one of its keyframes is confirmed.
-void doubt(Odometry* odometry, uint32_t reason) {
+void doubt(Odometry* odometry, tv_map_reason reason) {
   odometry->doubts = reason;
   odometry->doubtful_segment = odometry->segment;
 }
 
 void add_doubts(const Odometry& odometry, tv_odometry_state* state) {
-  if (odometry.doubtful_segment == odometry.segment) state->reasons |= odometry.doubts;
+  if (odometry.doubtful_segment == odometry.segment) state->map_reasons |= odometry.doubts;
 }
 
 // Removes the segment's keyframes that were made since the last confirmed one, and what only they
@@ -170,18 +182,18 @@ void remove_unconfirmed(Odometry* odometry) {
   }
   remove_lone_points(&map);
   gather_ways(odometry);  // what was wrong says nothing of the scale
-  doubt(odometry, TV_REASON_TWO_PLANAR_SOLUTIONS);
+  doubt(odometry, TV_MAP_REASON_CONTRADICTED);
   odometry->reference_id = last >= 0 ? map.keyframes[last].id : -1;
 }
 
 // Compares the map's way with that of the velocities. False: the map is wrong here, and what was
 // made since the last confirmed keyframe is removed, and all of a segment that was never in metres.
-bool heed_velocities(Odometry* odometry, const Frame& frame, uint32_t* reasons) {
+bool heed_velocities(Odometry* odometry, const Frame& frame, uint32_t* map_reasons) {
   if (!is_contrary(*odometry, frame)) {
     odometry->num_contrary = 0;
     return true;
   }
-  *reasons |= TV_REASON_SECOND_MOTION;
+  *map_reasons |= TV_MAP_REASON_VELOCITIES_DISAGREE;
   odometry->travel.is_contrary = true;
   if (odometry->velocity_trust < kLeastTrust || ++odometry->num_contrary < kMostContrary)
     return true;
@@ -202,9 +214,9 @@ bool heed_check(Odometry* odometry) {
   } else if (verdict == MapVerdict::kContradicts) {
     remove_unconfirmed(odometry);
   } else if (verdict == MapVerdict::kOnePlane && !is_checking(odometry->check)) {
-    doubt(odometry, TV_REASON_TWO_PLANAR_SOLUTIONS);
+    doubt(odometry, TV_MAP_REASON_ONE_PLANE);
   } else if (is_unconfirmed(odometry->check)) {
-    doubt(odometry, TV_REASON_LOW_PARALLAX);
+    doubt(odometry, TV_MAP_REASON_UNCONFIRMED);
   }
   return verdict != MapVerdict::kContradicts;
 }
@@ -236,7 +248,7 @@ bool add_frame_as_keyframe(Odometry* odometry, Frame* frame, LoopEnd* loop,
       const int32_t id = map.points[again->points[k]].id;
       if (id < 0 || id >= next_point_id) again->points[k] = kNoPoint;
     }
-    if (close_loop(odometry, newest, *again, *loop)) state->reasons |= TV_REASON_LOW_PARALLAX;
+    if (close_loop(odometry, newest, *again, *loop)) state->map_reasons |= TV_MAP_REASON_JUMPED;
     scale_by(loop->scale, odometry->motion.t);
     ++odometry->num_loops;
     state->loop_closed = 1;
@@ -339,11 +351,11 @@ bool finish_tracked(Odometry* odometry, const PoseFit& fit, bool follows, bool g
     add_travel(odometry, *frame);
   else
     begin_travel(odometry, frame->cam_from_world, -1);
-  if (!heed_velocities(odometry, *frame, &state->reasons)) return false;
+  if (!heed_velocities(odometry, *frame, &state->map_reasons)) return false;
   state->attitude_ignored = !check_attitude(*odometry, frame);
   odometry->turn_sigma = turn_sigma_of(fit.estimate.covariance, 6);
   // The path jumps here, because the map was moved since the last tracked frame.
-  if (odometry->was_moved_far) state->reasons |= TV_REASON_LOW_PARALLAX;
+  if (odometry->was_moved_far) state->map_reasons |= TV_MAP_REASON_JUMPED;
   odometry->was_moved_far = false;
   // It was tracked with the map as it was, which a check may confirm now and an adjustment moves
   // before the next frame.
@@ -359,7 +371,10 @@ bool finish_tracked(Odometry* odometry, const PoseFit& fit, bool follows, bool g
     if (!heed_check(odometry)) return false;
   }
   add_doubts(*odometry, state);
-  if (odometry->drift_sq > kMostDrift * kMostDrift) state->reasons |= TV_REASON_LOW_PARALLAX;
+  if (odometry->drift_sq > kMostDrift * kMostDrift) {
+    state->map_reasons |= TV_MAP_REASON_UNSURE_ATTITUDE;
+  }
+  state->reasons |= reasons_of(state->map_reasons);
   odometry->status = state->reasons == 0 ? TV_ODOMETRY_TRACKING : TV_ODOMETRY_WEAK;
   return true;
 }
@@ -414,8 +429,9 @@ bool begin_segment(Odometry* odometry, Frame* frame, tv_odometry_state* state) {
   odometry->reference_id = odometry->map.keyframes[newest].id;
   odometry->confirmed_id = odometry->reference_id;
   measure_reach(*odometry, *frame, &odometry->confirmed);
-  doubt(odometry, TV_REASON_LOW_PARALLAX);
-  state->reasons = odometry->doubts;
+  doubt(odometry, TV_MAP_REASON_UNCONFIRMED);
+  state->map_reasons = odometry->doubts;
+  state->reasons = reasons_of(state->map_reasons);
   odometry->check = MapCheck{};
   odometry->keyframe_inliers = odometry->map.keyframes[newest].num_observations;
   list_local_points(odometry, newest);
@@ -512,9 +528,11 @@ void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry
   }
   if (has_pose && !finish_tracked(odometry, fit, follows, input.gap != 0, frame, state)) {
     // What the frame was tracked with was wrong.
-    const bool is_contrary = (state->reasons & TV_REASON_SECOND_MOTION) != 0;
+    const bool is_contrary = (state->map_reasons & TV_MAP_REASON_VELOCITIES_DISAGREE) != 0;
     clear_state(*frame, state);
-    state->reasons = is_contrary ? TV_REASON_SECOND_MOTION : TV_REASON_TWO_PLANAR_SOLUTIONS;
+    state->map_reasons =
+        is_contrary ? TV_MAP_REASON_VELOCITIES_DISAGREE : TV_MAP_REASON_CONTRADICTED;
+    state->reasons = reasons_of(state->map_reasons);
     odometry->status = TV_ODOMETRY_LOST;
     odometry->lost_frames = 1;
     odometry->has_motion = has_pose = false;

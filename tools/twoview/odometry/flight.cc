@@ -235,6 +235,7 @@ void Flight::track_frame(SourceFrame frame) {
   add_still_mask();
   record.status = state_.status;
   record.reasons = state_.reasons;
+  record.map_reasons = state_.map_reasons;
   record.is_keyframe = state_.is_keyframe != 0;
   record.relocated = state_.relocated != 0;
   record.loop_closed = state_.loop_closed != 0;

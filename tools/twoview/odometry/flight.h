@@ -28,6 +28,7 @@ struct FlightFrame {
   double time_s = 0;
   int32_t status = TV_ODOMETRY_STARTING;
   uint32_t reasons = 0;
+  uint32_t map_reasons = 0;
   bool unreadable = false;
   bool is_keyframe = false, relocated = false, loop_closed = false;
   bool attitude_ignored = false;

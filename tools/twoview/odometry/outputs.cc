@@ -364,10 +364,20 @@ std::string reasons_text(const FlightFrame& frame) {
   return text;
 }
 
+std::string map_reasons_text(const FlightFrame& frame) {
+  const char* const words[] = {"unconfirmed", "contradicted",    "one_plane",
+                               "jumped",      "unsure_attitude", "velocities_disagree"};
+  std::string text;
+  for (size_t k = 0; k < std::size(words); ++k)
+    if ((frame.map_reasons >> k & 1) != 0)
+      text += (text.empty() ? "" : " ") + std::string(words[k]);
+  return text;
+}
+
 std::string frames_csv(const Flight& flight) {
   std::string text =
       "timestamp,name,status,reasons,segment,num_tracked,is_keyframe,time_ms,relocated,"
-      "loop_closed,pose,attitude_ignored,scale\n";
+      "loop_closed,pose,attitude_ignored,scale,map_reasons\n";
   const char* const origins[] = {"none", "tracked", "located"};
   for (const FlightFrame& frame : flight.frames()) {
     const auto status = static_cast<tv_odometry_status>(frame.status);
@@ -380,7 +390,7 @@ std::string frames_csv(const Flight& flight) {
             (frame.live_segment < 0 ? "none"
              : frame.live_metric    ? "metric"
                                     : "unit") +
-            "\n";
+            "," + map_reasons_text(frame) + "\n";
   }
   return text;
 }

@@ -64,6 +64,8 @@ std::string covariances_text(const std::vector<FlightKeyframe>& keyframes);
 std::string frames_csv(const Flight& flight);
 // The words for a frame's reasons: those of the verdict, or "unreadable".
 std::string reasons_text(const FlightFrame& frame);
+// The names of a frame's tv_map_reason bits, in lower case.
+std::string map_reasons_text(const FlightFrame& frame);
 // The indices of the points of the cloud: those that two keyframes see at an angle of at least 1.5
 // degrees. Below that their distance is a guess.
 std::vector<size_t> cloud_points(const std::vector<tv_map_point>& points,
