@@ -238,12 +238,13 @@ class Densifier:
         cx, cy = pair.centre
         self.cameras = [twoview.Camera(width, height, pair.focal, pair.focal, x, cy)._struct()
                         for x in (cx, cx + pair.offset)]
-        self.views = [_abi.tv_image(i.ctypes.data, width, height, i.strides[0])
-                      for i in pair.images]
+        self.views = (_abi.tv_image * 2)(*(
+            _abi.tv_image(i.ctypes.data, width, height, i.strides[0]) for i in pair.images))
         self.options = library.make(_abi.tv_dense_options)
         self.options.max_cells = 1 << 20
         self.options.max_steps = 256
-        self.R, self.t = np.eye(3), np.array([-1.0, 0, 0])
+        t = np.array([-1.0, 0, 0])
+        self.cameras_and_motion = _abi.camera_pair(*self.cameras, np.eye(3), t)
         # The points of the truth at every 40th pixel stand for the sparse points of the pair.
         v, u = np.mgrid[20:height:40, 20:width:40].reshape(2, -1)
         known = pair.disparity[v, u] + pair.offset
@@ -251,10 +252,12 @@ class Densifier:
         z = pair.focal / known
         self.sparse = np.zeros(len(z), _abi.POINT)
         at = np.stack([(u - cx) / pair.focal * z, (v - cy) / pair.focal * z, z], -1)
-        other = at + self.t
+        other = at + t
         self.sparse["position"] = at
         self.sparse["angle_rad"] = np.arccos((at * other).sum(1) / np.linalg.norm(at, axis=1) /
                                              np.linalg.norm(other, axis=1))
+        self.options.sparse = self.sparse.ctypes.data
+        self.options.num_sparse = len(self.sparse)
         size = ctypes.c_size_t()
         library.call("tv_dense_size", *map(ctypes.byref, (*self.cameras, self.options, size)))
         self.size = size
@@ -266,9 +269,9 @@ class Densifier:
     def __call__(self):
         count = ctypes.c_int32()
         p = _abi.pointer
-        self.library.call("tv_densify", *map(ctypes.byref, (*self.views, *self.cameras)), p(self.R),
-                          p(self.t), p(self.sparse), ctypes.c_int32(len(self.sparse)),
-                          ctypes.byref(self.options), p(self.memory), self.size, p(self.points),
+        self.library.call("tv_densify", p(self.memory), self.size,
+                          ctypes.byref(self.cameras_and_motion), self.views,
+                          ctypes.byref(self.options), p(self.points),
                           ctypes.c_int32(len(self.points)), ctypes.byref(count))
         return self.points[:count.value]
 

@@ -87,8 +87,8 @@ void add_describe(const bench::Pair& pair, float size, int count) {
   bench::add({bench::ours(name),
               [=] {
                 const tv_image image = bench::view_of(pixels);
-                bench::require(tv_describe(context.get(), &image, &options, d->keypoints.data(),
-                                           num, d->ours.data()),
+                bench::require(tv_describe(context.get(), &image, d->keypoints.data(), num,
+                                           &options, d->ours.data()),
                                "tv_describe");
               },
               [=] {

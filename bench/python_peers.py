@@ -152,8 +152,8 @@ class Ours:
 
         def work():
             self.library.call("tv_describe", self.context._pointer, ctypes.byref(self.views[0]),
-                              ctypes.byref(wanted), ctypes.c_void_p(keypoints.ctypes.data),
-                              ctypes.c_int32(len(keypoints)),
+                              ctypes.c_void_p(keypoints.ctypes.data),
+                              ctypes.c_int32(len(keypoints)), ctypes.byref(wanted),
                               ctypes.c_void_p(descriptors.ctypes.data))
             return descriptors
         return work

@@ -58,7 +58,7 @@ static void detect(stages *s) {
 }
 
 static void describe(stages *s) {
-  require(tv_describe(s->context, &s->image[0], NULL, s->keypoints[0], s->num_keypoints[0],
+  require(tv_describe(s->context, &s->image[0], s->keypoints[0], s->num_keypoints[0], NULL,
                       s->descriptors[0]) == TV_OK,
           "tv_describe");
 }

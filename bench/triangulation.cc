@@ -123,10 +123,17 @@ void triangulate_by_opencv(bool optimal, const Scene& scene, std::vector<tv_poin
 
 void triangulate(int method, const Scene& scene, std::vector<tv_point>* points) {
   if (method >= kPeerLinear) return triangulate_by_opencv(method == kPeerOptimal, scene, points);
-  bench::require(tv_triangulate(static_cast<tv_triangulation>(method), &scene.camera, &scene.camera,
-                                scene.R, scene.t, scene.pixels[0].data(), scene.pixels[1].data(),
-                                scene.size(), points->data()),
-                 "tv_triangulate");
+  tv_camera_pair pair{scene.camera, scene.camera, {}, {}};
+  std::copy(scene.R, scene.R + 9, pair.cam1_from_cam0_R);
+  std::copy(scene.t, scene.t + 3, pair.cam1_from_cam0_t);
+  tv_pixel_pairs pixels;
+  tv_pixel_pairs_init(&pixels);
+  pixels.num = scene.size();
+  pixels.pixels0 = scene.pixels[0].data();
+  pixels.pixels1 = scene.pixels[1].data();
+  bench::require(
+      tv_triangulate(&pair, &pixels, static_cast<tv_triangulation>(method), points->data()),
+      "tv_triangulate");
 }
 
 struct Errors {

@@ -34,7 +34,7 @@ void solve_ours(Case* c) {
   tv_window_result_init(&result);
   uint8_t* memory = c->memory.data();
   memory += (64 - reinterpret_cast<uintptr_t>(memory) % 64) % 64;
-  bench::require(tv_adjust_window(&window, &c->options, memory, c->memory.size() - 64, nullptr,
+  bench::require(tv_adjust_window(memory, c->memory.size() - 64, &window, &c->options, nullptr,
                                   nullptr, &result),
                  "tv_adjust_window");
   c->cost = result.final_cost;

@@ -57,9 +57,9 @@ int main(int argc, char **argv) {
   for (v = 0; v < 2; ++v) { /* tv_extract: tv_detect, tv_orient, tv_describe in one */
     status = tv_detect(context, &image[v], NULL, NULL, corner, CORNERS, &corners);
     if (status == TV_OK)
-      status = tv_orient(context, &image[v], NULL, corner, corners, keypoint[v], MOST, &count[v]);
+      status = tv_orient(context, &image[v], corner, corners, NULL, keypoint[v], MOST, &count[v]);
     if (status == TV_OK)
-      status = tv_describe(context, &image[v], NULL, keypoint[v], count[v], descriptor[v]);
+      status = tv_describe(context, &image[v], keypoint[v], count[v], NULL, descriptor[v]);
     if (status != TV_OK) return fail(tv_status_string(status));
   }
   tv_match_options_init(&options);

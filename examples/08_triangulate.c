@@ -38,6 +38,7 @@ int main(int argc, char **argv) {
   tv_limits limits;
   tv_context *context;
   tv_pixel_pairs pairs;
+  tv_camera_pair pair;
   tv_two_view pose;
   tv_status status;
   int n, k, v, method, kept = 0;
@@ -65,9 +66,10 @@ int main(int argc, char **argv) {
   status = tv_estimate_two_view(context, &camera[0], &camera[1], &pairs, NULL, &pose, inlier);
   if (status != TV_OK) return fail(tv_status_string(status));
   if (!pose.has_R || !pose.has_t) return fail("no full pose");
-  for (v = 0; v < 2; ++v)
-    tv_corrected_camera(&pose, &camera[v], &camera[v]); /* adds the estimated shift of cx, cy */
-  for (k = 0; k < n; ++k) {                             /* moves the inliers to the front */
+  /* The pose with the cameras that it refers to: with the estimated shift of cx, cy, if any. */
+  status = tv_corrected_pair(&pose, &camera[0], &camera[1], &pair);
+  if (status != TV_OK) return fail(tv_status_string(status));
+  for (k = 0; k < n; ++k) { /* moves the inliers to the front */
     if (!inlier[k]) continue;
     for (v = 0; v < 2; ++v) {
       pixels[v][2 * kept] = pixels[v][2 * k];
@@ -75,12 +77,12 @@ int main(int argc, char **argv) {
     }
     ++kept;
   }
+  pairs.num = kept;
   printf("%-16s %8s %14s\n", "method", "points", "error, px rms");
   for (method = TV_TRIANGULATION_POLY; method <= TV_TRIANGULATION_MIDPOINT; ++method) {
     double sum = 0;
     int good = 0;
-    status = tv_triangulate(method, &camera[0], &camera[1], pose.R, pose.t, pixels[0], pixels[1],
-                            kept, point);
+    status = tv_triangulate(&pair, &pairs, method, point);
     if (status != TV_OK) return fail(tv_status_string(status));
     for (k = 0; k < kept; ++k) {
       if (point[k].status != TV_POINT_OK) continue;

@@ -4,8 +4,7 @@
    usage: 17_room room.obj */
 #include <math.h>
 #include <stdio.h>
-#include <twoview/depth_map.h>
-#include <twoview/room.h>
+#include <string.h>
 #include <twoview/twoview.h>
 
 enum { WIDTH = 320, HEIGHT = 240, VIEWS = 5, MAP = 160 * 120, MAX_VERTICES = 20000 };
@@ -60,28 +59,30 @@ int main(int argc, char **argv) {
   options.near_depth = 1;
   options.far_depth = 4;
   status = tv_depth_map_camera(&camera, &options, &map_camera);
-  if (status == TV_OK) status = tv_room_init(NULL, memory, sizeof memory, &room);
+  if (status == TV_OK) status = tv_room_init(&room, NULL, memory, sizeof memory);
   for (k = 0; k < VIEWS && status == TV_OK; ++k) {
     tv_depth_map map;
     seen[0] = view[k]; /* with its neighbours, or the two nearest at an end */
     seen[1] = view[k > 0 ? k - 1 : 2];
     seen[2] = view[k < VIEWS - 1 ? k + 1 : VIEWS - 3];
-    status = tv_sweep_depth(seen, 3, &options, sweep, sizeof sweep, &arrays);
+    status = tv_sweep_depth(sweep, sizeof sweep, seen, 3, &options, &arrays);
     if (status != TV_OK) break;
     tv_depth_map_init(&map);
     map.width = map.stride = map_camera.width;
     map.height = map_camera.height;
+    map.camera = &map_camera;
+    memcpy(map.world_from_cam_R, seen[0].world_from_cam_R, sizeof map.world_from_cam_R);
+    memcpy(map.world_from_cam_t, seen[0].world_from_cam_t, sizeof map.world_from_cam_t);
     map.distance = distance;
     map.sigma = sigma;
     map.witnesses = witnesses;
     do { /* a room that is full goes on with coarser voxels, and loses nothing */
-      status =
-          tv_room_add(room, &map_camera, seen[0].world_from_cam_R, seen[0].world_from_cam_t, &map);
+      status = tv_room_add(room, &map);
     } while (status == TV_ERR_CAPACITY && tv_room_coarsen(room) == TV_OK);
   }
   if (status == TV_OK)
-    status = tv_room_mesh(room, NULL, vertex, MAX_VERTICES, triangle, 2 * MAX_VERTICES,
-                          &num_vertices, &num_triangles);
+    status = tv_room_mesh(room, NULL, vertex, MAX_VERTICES, &num_vertices, triangle,
+                          2 * MAX_VERTICES, &num_triangles);
   if (status != TV_OK) return fprintf(stderr, "%s\n", tv_status_string(status)), 2;
   file = fopen(argv[1], "w");
   if (file == NULL) return fprintf(stderr, "cannot write %s\n", argv[1]), 2;

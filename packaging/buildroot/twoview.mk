@@ -4,7 +4,7 @@
 #
 ################################################################################
 
-TWOVIEW_VERSION = 0.1.0
+TWOVIEW_VERSION = 0.2.0
 TWOVIEW_SOURCE = twoview-$(TWOVIEW_VERSION).tar.xz
 # The folder that holds the source archive of scripts/release.
 TWOVIEW_SITE = $(TWOVIEW_PKGDIR)

@@ -52,12 +52,12 @@ from .stages import (BundleResult, Reconstruction, TwoView, adjust_two_view, ali
                      point_covariances, reconstruct, triangulate)
 from .window import WindowResult, adjust_window
 
-#: The version of the loaded library, such as "0.1.0": that of version_string().
+#: The version of the loaded library, such as "0.2.0": that of version_string().
 __version__: str
 
 
 def version_string() -> str:
-    """tv_version_string: returns the version of the loaded library, such as "0.1.0". Raises
+    """tv_version_string: returns the version of the loaded library, such as "0.2.0". Raises
     ImportError where there is no library."""
     return default_library().version()
 

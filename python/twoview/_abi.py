@@ -17,8 +17,8 @@ import numpy as np
 
 from .enums import Status
 
-# The library of this ABI where it is installed in the system, as Debian's libtwoview0.1 does it.
-SONAME = "libtwoview.so.0.1"
+# The library of this ABI where it is installed in the system, as Debian's libtwoview0.2 does it.
+SONAME = "libtwoview.so.0.2"
 DESCRIPTOR_BYTES = 128
 CONTEXT_ALIGNMENT = 64
 
@@ -38,6 +38,11 @@ class tv_camera(Structure):
     _fields_ = [("model", c_int32), ("width", c_int32), ("height", c_int32), ("reserved", c_int32),
                 ("fx", c_double), ("fy", c_double), ("cx", c_double), ("cy", c_double),
                 ("k", c_double * 8)]
+
+
+class tv_camera_pair(Structure):
+    _fields_ = [("camera0", tv_camera), ("camera1", tv_camera),
+                ("cam1_from_cam0_R", c_double * 9), ("cam1_from_cam0_t", c_double * 3)]
 
 
 class tv_keypoint(Structure):
@@ -70,6 +75,10 @@ class tv_match_options(Structure):
 class tv_guided_options(Structure):
     _fields_ = [("struct_size", c_uint32), ("max_error_px", c_float), ("ratio", c_float),
                 ("max_distance", c_float), ("neighbourhood_px", c_float)]
+
+
+class tv_epipolar(Structure):
+    _fields_ = [("camera0", c_void_p), ("camera1", c_void_p), ("matrix", c_double * 9)]
 
 
 class tv_pixel_pairs(Structure):
@@ -279,7 +288,7 @@ class tv_map_observation(Structure):
 
 class tv_dense_options(Structure):
     _fields_ = [("struct_size", c_uint32), ("max_cells", c_int32), ("max_steps", c_int32),
-                ("reserved", c_int32), ("min_parallax_rad", c_double),
+                ("num_sparse", c_int32), ("sparse", c_void_p), ("min_parallax_rad", c_double),
                 ("max_parallax_rad", c_double), ("max_relative_sigma", c_double)]
 
 
@@ -311,7 +320,8 @@ class tv_room_options(Structure):
 
 class tv_depth_map(Structure):
     _fields_ = [("struct_size", c_uint32), ("width", c_int32), ("height", c_int32),
-                ("stride", c_int32), ("distance", c_void_p), ("sigma", c_void_p),
+                ("stride", c_int32), ("camera", c_void_p), ("world_from_cam_R", c_double * 9),
+                ("world_from_cam_t", c_double * 3), ("distance", c_void_p), ("sigma", c_void_p),
                 ("witnesses", c_void_p), ("pixels", c_void_p), ("pixel_stride_bytes", c_int64),
                 ("channels", c_int32), ("inferred", c_int32), ("mask", c_void_p),
                 ("mask_stride_bytes", c_int64)]
@@ -352,20 +362,21 @@ class tv_room_plane_options(Structure):
 
 
 class tv_room_infer_options(Structure):
-    _fields_ = [("struct_size", c_uint32), ("max_step", c_int32)]
+    _fields_ = [("struct_size", c_uint32), ("max_step", c_int32), ("planes", c_void_p),
+                ("num_planes", c_int32), ("reserved", c_int32)]
 
 
-STRUCTS = [tv_limits, tv_image, tv_camera, tv_keypoint, tv_features, tv_feature_options,
-           tv_correspondence, tv_match_options, tv_guided_options, tv_pixel_pairs,
-           tv_estimate_options, tv_two_view, tv_point, tv_view, tv_reconstruct_options,
-           tv_reconstruction, tv_bundle_options, tv_bundle_result, tv_pixel_points,
-           tv_absolute_pose_options, tv_absolute_pose, tv_window_view, tv_observation,
-           tv_pose_prior, tv_gravity_prior, tv_distance_prior, tv_window, tv_window_options,
-           tv_window_result, tv_odometry_options, tv_odometry_frame, tv_odometry_state,
-           tv_keyframe, tv_map_point, tv_map_observation, tv_dense_options, tv_dense_point,
-           tv_depth_options, tv_depth_view, tv_depth_arrays,
-           tv_room_options, tv_depth_map, tv_room_state, tv_room_vertex, tv_room_triangle,
-           tv_room_mesh_options, tv_room_plane, tv_room_plane_options, tv_room_infer_options]
+STRUCTS = [tv_limits, tv_image, tv_camera, tv_camera_pair, tv_epipolar, tv_keypoint, tv_features,
+           tv_feature_options, tv_correspondence, tv_match_options, tv_guided_options,
+           tv_pixel_pairs, tv_estimate_options, tv_two_view, tv_point, tv_view,
+           tv_reconstruct_options, tv_reconstruction, tv_bundle_options, tv_bundle_result,
+           tv_pixel_points, tv_absolute_pose_options, tv_absolute_pose, tv_window_view,
+           tv_observation, tv_pose_prior, tv_gravity_prior, tv_distance_prior, tv_window,
+           tv_window_options, tv_window_result, tv_odometry_options, tv_odometry_frame,
+           tv_odometry_state, tv_keyframe, tv_map_point, tv_map_observation, tv_dense_options,
+           tv_dense_point, tv_depth_options, tv_depth_view, tv_depth_arrays, tv_room_options,
+           tv_depth_map, tv_room_state, tv_room_vertex, tv_room_triangle, tv_room_mesh_options,
+           tv_room_plane, tv_room_plane_options, tv_room_infer_options]
 
 KEYPOINT = np.dtype(tv_keypoint)
 CORRESPONDENCE = np.dtype(tv_correspondence)
@@ -559,6 +570,15 @@ def default_library() -> Library:
 
 def pointer(array: Optional[np.ndarray]) -> Optional[c_void_p]:
     return None if array is None else c_void_p(array.ctypes.data)
+
+
+def camera_pair(camera0: tv_camera, camera1: tv_camera, R: np.ndarray,
+                t: np.ndarray) -> tv_camera_pair:
+    """The struct of two cameras and cam1_from_cam0."""
+    pair = tv_camera_pair(camera0, camera1)
+    pair.cam1_from_cam0_R[:] = R.ravel().tolist()
+    pair.cam1_from_cam0_t[:] = t.tolist()
+    return pair
 
 
 def _numbers(name: str, values: Any, dtype: np.dtype) -> np.ndarray:

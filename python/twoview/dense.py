@@ -30,11 +30,14 @@ def densify(image0: np.ndarray, camera0: Camera, image1: np.ndarray, camera1: Ca
     is out of its range, TV_ERR_NOT_FINITE for R, t or an option."""
     library = _abi.default_library()
     wanted = to_struct(library, DenseOptions, options, keywords)
-    views = [_abi.check_image("image0", image0), _abi.check_image("image1", image1)]
+    views = (_abi.tv_image * 2)(_abi.check_image("image0", image0),
+                                _abi.check_image("image1", image1))
     lenses = [camera_struct("camera0", camera0), camera_struct("camera1", camera1)]
     rotation, translation = _abi.small_array("R", R, 3, 3), _abi.small_array("t", t, 3)
+    pair = _abi.camera_pair(lenses[0], lenses[1], rotation, translation)
     known = np.zeros(0, _abi.POINT) if sparse is None else sparse
     known = _abi.check_array("sparse", known, _abi.POINT)
+    wanted.sparse, wanted.num_sparse = known.ctypes.data, len(known)
     if not 0 <= max_points < 2**31:
         raise ValueError(f"max_points: {max_points} is out of range")
     size, count = c_size_t(), c_int32()
@@ -42,8 +45,6 @@ def densify(image0: np.ndarray, camera0: Camera, image1: np.ndarray, camera1: Ca
     memory = np.empty(size.value + _abi.CONTEXT_ALIGNMENT, np.uint8)
     memory = memory[-memory.ctypes.data % _abi.CONTEXT_ALIGNMENT:]
     points = np.zeros(min(max_points, wanted.max_cells), _abi.DENSE_POINT)
-    library.call("tv_densify", byref(views[0]), byref(views[1]), byref(lenses[0]),
-                 byref(lenses[1]), _abi.pointer(rotation), _abi.pointer(translation),
-                 _abi.pointer(known), c_int32(len(known)), byref(wanted), _abi.pointer(memory),
-                 size, _abi.pointer(points), c_int32(len(points)), byref(count))
+    library.call("tv_densify", _abi.pointer(memory), size, byref(pair), views, byref(wanted),
+                 _abi.pointer(points), c_int32(len(points)), byref(count))
     return points[:count.value].copy()

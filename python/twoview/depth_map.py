@@ -59,7 +59,7 @@ def sweep_depth(images: Sequence[np.ndarray], cameras: Sequence[Camera],
     witnesses, grey = np.zeros(shape, np.uint8), np.zeros(shape, np.uint8)
     arrays = _abi.tv_depth_arrays(*(array.ctypes.data
                                     for array in (distance, sigma, witnesses, grey)))
-    library.call("tv_sweep_depth", views, c_int32(len(images)), byref(wanted),
-                 _abi.pointer(memory), size, byref(arrays))
+    library.call("tv_sweep_depth", _abi.pointer(memory), size, views, c_int32(len(images)),
+                 byref(wanted), byref(arrays))
     pinhole = Camera(camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy)
     return DepthMap(pinhole, distance, sigma, witnesses, grey)

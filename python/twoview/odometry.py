@@ -164,12 +164,12 @@ class Odometry:
 
     def locate(self, image: np.ndarray, near_id: int = -1,
                mask: Optional[np.ndarray] = None) -> OdometryState:
-        """tv_odometry_locate_masked: the pose of a frame in the map as it is. near_id: a keyframe
+        """tv_odometry_locate: the pose of a frame in the map as it is. near_id: a keyframe
         whose surroundings are searched first. mask: as for track."""
         view = _abi.check_image("image", image)
         used = None if mask is None else byref(_abi.check_mask("mask", mask, image))
         state = self.library.make(_abi.tv_odometry_state)
-        self._call("tv_odometry_locate_masked", byref(view), used, c_int32(near_id), byref(state))
+        self._call("tv_odometry_locate", byref(view), used, c_int32(near_id), byref(state))
         return _state(state)
 
     def pose_of(self, state: OdometryState) -> tuple[np.ndarray, np.ndarray, int]:

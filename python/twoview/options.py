@@ -40,7 +40,6 @@ class FeatureOptions:
     descriptor: int = Normalisation.ROOTSIFT  #: a Normalisation
     keypoint_size: float = 4.0  #: diameter of a keypoint at level 0, pixels
     pooling: int = 0  #: 1: a descriptor is the mean over windows of 0.7 and 1.3 times its size
-    reserved: int = 0  #: must be 0
 
 
 @dataclass(frozen=True)
@@ -88,7 +87,6 @@ class EstimateOptions(_Options):
     #: radians; 0: all rows are exposed at once, and no rolling shutter is tested.
     readout_turn_sigma_rad: float = 0.02
     num_trials: int = 0  #: which attempt at the pair this is; 0 means the first
-    reserved: int = 0  #: must be 0
 
 
 @dataclass(frozen=True)
@@ -107,7 +105,6 @@ class AbsolutePoseOptions(_Options):
 
     max_iterations: int = 10000  #: most samples, [1, 1000000]; it bounds the time
     fixed_iterations: int = 0  #: number of iterations; 0: it is adaptive
-    reserved: int = 0  #: must be 0
     max_error_px: float = 4.0  #: inlier threshold, pixels between a pixel and its point's image
     confidence: float = 0.9999  #: probability of not having missed a better model, [0, 1)
     seed: Optional[int] = None  #: seed of the sampler; None: the library's constant
@@ -125,7 +122,6 @@ class WindowOptions:
     noise_px: float = 1.0  #: of an observation of sigma 1, which weighs it against the priors
     tolerance: float = 1e-6  #: share of the cost that may be left to gain
     max_iterations: int = 50  #: most steps, [0, 1000]
-    reserved: int = 0  #: must be 0
 
 
 @dataclass(frozen=True)
@@ -139,7 +135,6 @@ class OdometryOptions:
     kernels: int = Kernels.AUTO
     seed: Optional[int] = None  #: seed of every sampler; None: the library's constant
     correct_camera: bool = True  #: move the principal point where many keyframes agree
-    reserved: int = 0  #: must be 0
 
 
 @dataclass(frozen=True)
@@ -148,7 +143,6 @@ class DenseOptions:
 
     max_cells: int = 400000  #: most cells of the grid, [1024, 16777216]
     max_steps: int = 256  #: most steps of parallax, [16, 512]
-    reserved: int = 0  #: must be 0
     min_parallax_rad: float = 0.0  #: least parallax, radians
     max_parallax_rad: float = 0.0  #: largest parallax, radians; 0: the range of the sparse points
     max_relative_sigma: float = 0.05  #: largest sigma of a distance, as a share of it
@@ -191,7 +185,6 @@ class RoomMeshOptions(_Options):
 class RoomPlaneOptions(_Options):
     """The options of Room.find_planes, as in tv_room_plane_options."""
 
-    reserved: int = 0  #: must be 0
     min_area: float = 0.0  #: of a plane, in squares of the unit; 0: 640 squares of a voxel's side
     gravity: Sequence[float] = (0.0, 0.0, 0.0)  #: its direction in the world; zeros: not known
     gravity_sigma_rad: float = 0.02  #: standard deviation of that direction

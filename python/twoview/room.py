@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from ctypes import byref, c_int32, c_size_t, c_void_p
+from ctypes import addressof, byref, c_int32, c_size_t, c_void_p
 from dataclasses import dataclass
 from typing import Any, Optional, Sequence
 
@@ -56,9 +56,8 @@ class Room:
                                                       np.uint8)
         start = -self._memory.ctypes.data % _abi.CONTEXT_ALIGNMENT
         self._pointer = c_void_p()
-        self.library.call("tv_room_init", byref(wanted),
-                          c_void_p(self._memory.ctypes.data + start), c_size_t(memory_bytes),
-                          byref(self._pointer))
+        self.library.call("tv_room_init", byref(self._pointer), byref(wanted),
+                          c_void_p(self._memory.ctypes.data + start), c_size_t(memory_bytes))
         self._lock = threading.RLock()
 
     def __enter__(self) -> Room:
@@ -105,11 +104,8 @@ class Room:
                    inferred)
 
     def _fuse(self, function: str, camera: Camera, R: Any, t: Any, *arrays: Any) -> None:
-        lens = camera_struct("camera", camera)
-        rotation, translation = _abi.small_array("R", R, 3, 3), _abi.small_array("t", t, 3)
-        depth, kept = depth_map(self.library, *arrays)
-        self._call(function, byref(lens), _abi.pointer(rotation), _abi.pointer(translation),
-                   byref(depth))
+        depth, kept = depth_map(self.library, camera, R, t, *arrays)
+        self._call(function, byref(depth))
         del kept
 
     def see_through(self, camera: Camera, R: Sequence[Sequence[float]], t: Sequence[float],
@@ -146,18 +142,16 @@ class Room:
         see_through with each measured map."""
         wanted = to_struct(self.library, RoomInferOptions, options, keywords)
         planes = _abi.check_array("planes", planes, _abi.ROOM_PLANE)
-        lens = camera_struct("camera", camera)
-        rotation, translation = _abi.small_array("R", R, 3, 3), _abi.small_array("t", t, 3)
-        depth, kept = depth_map(self.library, distance, sigma, witnesses, pixels, mask, False)
+        wanted.planes, wanted.num_planes = planes.ctypes.data, len(planes)
+        depth, kept = depth_map(self.library, camera, R, t, distance, sigma, witnesses, pixels,
+                                mask, False)
         size, count = c_size_t(), c_int32()
         self.library.call("tv_room_infer_size", c_int32(depth.width), c_int32(depth.height),
                           byref(size))
         memory = np.empty(size.value + _abi.CONTEXT_ALIGNMENT, np.uint8)
         memory = memory[-memory.ctypes.data % _abi.CONTEXT_ALIGNMENT:]
         inferred = np.zeros((2, depth.height, depth.width), np.float32)
-        self._call("tv_room_infer", byref(lens), _abi.pointer(rotation),
-                   _abi.pointer(translation), byref(depth), _abi.pointer(planes),
-                   c_int32(len(planes)), byref(wanted), _abi.pointer(memory), size,
+        self._call("tv_room_infer", _abi.pointer(memory), size, byref(depth), byref(wanted),
                    _abi.pointer(inferred[0]), _abi.pointer(inferred[1]), byref(count))
         del kept
         return inferred[0], inferred[1]
@@ -188,8 +182,8 @@ class Room:
 
         def call() -> None:
             self._call("tv_room_mesh", byref(wanted), _abi.pointer(vertices),
-                       c_int32(len(vertices)), _abi.pointer(triangles), c_int32(len(triangles)),
-                       byref(num_vertices), byref(num_triangles))
+                       c_int32(len(vertices)), byref(num_vertices), _abi.pointer(triangles),
+                       c_int32(len(triangles)), byref(num_triangles))
 
         with self._lock:
             try:
@@ -202,16 +196,21 @@ class Room:
                         triangles[:num_triangles.value].copy())
 
 
-def depth_map(library: _abi.Library, distance: np.ndarray, sigma: Optional[np.ndarray],
-              witnesses: Optional[np.ndarray], pixels: Optional[np.ndarray],
-              mask: Optional[np.ndarray], inferred: bool) -> tuple[Any, list[np.ndarray]]:
-    """The tv_depth_map of these arrays, and the arrays that have to live as long."""
+def depth_map(library: _abi.Library, camera: Camera, R: Any, t: Any, distance: np.ndarray,
+              sigma: Optional[np.ndarray], witnesses: Optional[np.ndarray],
+              pixels: Optional[np.ndarray], mask: Optional[np.ndarray],
+              inferred: bool) -> tuple[Any, list[Any]]:
+    """The tv_depth_map of a view, and what has to live as long."""
+    lens = camera_struct("camera", camera)
+    rotation, translation = _abi.small_array("R", R, 3, 3), _abi.small_array("t", t, 3)
     shape = np.shape(distance)
     if len(shape) != 2 or 0 in shape or max(shape) >= 2**31:
         raise ValueError(f"distance: shape (height, width) is expected, not {shape}")
     fields: dict[str, Any] = {"width": shape[1], "height": shape[0], "stride": shape[1],
-                              "mask_stride_bytes": shape[1], "inferred": int(inferred)}
-    kept: list[np.ndarray] = []
+                              "mask_stride_bytes": shape[1], "inferred": int(inferred),
+                              "camera": addressof(lens), "world_from_cam_R": rotation.ravel(),
+                              "world_from_cam_t": translation}
+    kept: list[Any] = [lens]
     for name, array, dtype in (("distance", distance, np.float32), ("sigma", sigma, np.float32),
                                ("witnesses", witnesses, np.uint8),
                                ("mask", _abi.mask_bytes(mask), np.uint8)):

@@ -63,9 +63,9 @@ def orient(context: Context, image: np.ndarray, keypoints: np.ndarray,
     keypoints = _abi.check_array("keypoints", keypoints, _abi.KEYPOINT)
     oriented = np.empty(2 * len(keypoints), _abi.KEYPOINT)
     count = c_int32()
-    context.call("tv_orient", _images(image, None)[0], byref(wanted), _abi.pointer(keypoints),
-                 c_int32(len(keypoints)), _abi.pointer(oriented), c_int32(len(oriented)),
-                 byref(count))
+    context.call("tv_orient", _images(image, None)[0], _abi.pointer(keypoints),
+                 c_int32(len(keypoints)), byref(wanted), _abi.pointer(oriented),
+                 c_int32(len(oriented)), byref(count))
     return oriented[: count.value].copy()
 
 
@@ -81,8 +81,8 @@ def describe(context: Context, image: np.ndarray, keypoints: np.ndarray,
     wanted = to_struct(check_context(context).library, FeatureOptions, options, keywords)
     keypoints = _abi.check_array("keypoints", keypoints, _abi.KEYPOINT)
     descriptors = np.empty((len(keypoints), _abi.DESCRIPTOR_BYTES), np.uint8)
-    context.call("tv_describe", _images(image, None)[0], byref(wanted), _abi.pointer(keypoints),
-                 c_int32(len(keypoints)), _abi.pointer(descriptors))
+    context.call("tv_describe", _images(image, None)[0], _abi.pointer(keypoints),
+                 c_int32(len(keypoints)), byref(wanted), _abi.pointer(descriptors))
     return descriptors
 
 
@@ -137,10 +137,10 @@ def keypoint_sigmas(keypoints: np.ndarray, exponent: float,
     return sigmas
 
 
-def _pairs(context: Context, pixels0: np.ndarray, pixels1: np.ndarray,
+def _pairs(library: _abi.Library, pixels0: np.ndarray, pixels1: np.ndarray,
            **values: Any) -> Any:
     """A tv_pixel_pairs; values: ratios, sigmas0, sigmas1, each (n,) float32 or None."""
-    pairs = context.library.make(_abi.tv_pixel_pairs)
+    pairs = library.make(_abi.tv_pixel_pairs)
     pairs.kept = [pixels0, pixels1]  # the struct only points to them
     pairs.num = len(pixels0)
     pairs.pixels0, pairs.pixels1 = _abi.pointer(pixels0), _abi.pointer(pixels1)
@@ -221,14 +221,14 @@ def align_matches(context: Context, image0: np.ndarray, image1: np.ndarray, keyp
     above the context's limits, TV_ERR_ARGUMENT for an index or a size out of its range,
     TV_ERR_NOT_FINITE for a keypoint that is not finite."""
     check_context(context)
-    views = [byref(_abi.check_image("image", image)) for image in (image0, image1)]
+    views = (_abi.tv_image * 2)(*(_abi.check_image("image", i) for i in (image0, image1)))
     moved = [_abi.check_array(name, array, _abi.KEYPOINT).copy()
              for name, array in (("keypoints0", keypoints0), ("keypoints1", keypoints1))]
     matches = _abi.check_array("matches", matches, _abi.CORRESPONDENCE)
     aligned = np.zeros(len(matches), np.uint8)
-    context.call("tv_align_matches", *views, ctypes.c_float(size_of_one), _abi.pointer(moved[0]),
-                 c_int32(len(moved[0])), _abi.pointer(moved[1]), c_int32(len(moved[1])),
-                 _abi.pointer(matches), c_int32(len(matches)), _abi.pointer(aligned))
+    context.call("tv_align_matches", views, _abi.pointer(matches), c_int32(len(matches)),
+                 ctypes.c_float(size_of_one), (ctypes.c_void_p * 2)(*map(_abi.pointer, moved)),
+                 (c_int32 * 2)(*map(len, moved)), _abi.pointer(aligned))
     factors = aligned.astype(np.float32) / 128
     factors[aligned == 0] = 1
     return moved[0], moved[1], aligned != 0, factors
@@ -247,6 +247,20 @@ def _two_cameras(camera0: Optional[Camera], camera1: Optional[Camera]) -> list[A
     if _are_uncalibrated(camera0, camera1):
         return [None, None]
     return [byref(camera_struct("camera0", camera0)), byref(camera_struct("camera1", camera1))]
+
+
+def _pair(camera0: Optional[Camera], camera1: Optional[Camera], R: Sequence[Sequence[float]],
+          t: Sequence[float]) -> Any:
+    """A tv_camera_pair; None where both cameras are, which C refuses."""
+    rotation, translation = _abi.small_array("R", R, 3, 3), _abi.small_array("t", t, 3)
+    if _are_uncalibrated(camera0, camera1):
+        return None
+    return _abi.camera_pair(camera_struct("camera0", camera0), camera_struct("camera1", camera1),
+                            rotation, translation)
+
+
+def _by_reference(struct: Any) -> Any:
+    return None if struct is None else byref(struct)
 
 
 def match_guided(context: Context, camera0: Optional[Camera], camera1: Optional[Camera],
@@ -274,8 +288,12 @@ def match_guided(context: Context, camera0: Optional[Camera], camera1: Optional[
         arguments.append(byref(_features(context, keypoints, descriptors)))
     found = np.empty(min(len(keypoints0), len(keypoints1)), _abi.CORRESPONDENCE)
     count = c_int32()
-    context.call("tv_match_guided", *_two_cameras(camera0, camera1), _abi.pointer(matrix),
-                 *arguments, byref(wanted), _abi.pointer(found), c_int32(len(found)), byref(count))
+    cameras = [None if _are_uncalibrated(camera0, camera1) else camera_struct(name, camera)
+               for name, camera in (("camera0", camera0), ("camera1", camera1))]
+    known = _abi.tv_epipolar(*(None if c is None else ctypes.addressof(c) for c in cameras))
+    known.matrix[:] = matrix.ravel().tolist()
+    context.call("tv_match_guided", byref(known), *arguments, byref(wanted), _abi.pointer(found),
+                 c_int32(len(found)), byref(count))
     return found[: count.value].copy()
 
 
@@ -393,9 +411,9 @@ def _two_view(found: Any) -> TwoView:
 
 
 def corrected_camera(found: TwoView, camera: Camera) -> Camera:
-    """tv_corrected_camera: the Camera that the results in `found` refer to: `camera` with
-    principal_point_shift (pixels) added and multiplied by focal_scale. Use it in calls after the
-    estimate. It is `camera` itself unless an option let the estimate move it.
+    """tv_corrected_pair, of one camera. Returns the Camera that the results in `found` refer to:
+    `camera` with principal_point_shift (pixels) added and multiplied by focal_scale. Use it in
+    calls after the estimate. It is `camera` itself unless an option let the estimate move it.
 
     found: of estimate_two_view or reconstruct. camera: one of its two cameras.
     Raises TypeError or AttributeError for other objects."""
@@ -417,7 +435,7 @@ def _estimate(context: Context, camera0: Optional[Camera], camera1: Optional[Cam
               pixels0: ArrayLike, pixels1: ArrayLike, wanted: Any,
               **values: Optional[ArrayLike]) -> tuple[Any, np.ndarray]:
     pixels0, pixels1 = _pixels(pixels0, pixels1)
-    pairs = _pairs(context, pixels0, pixels1, **values)
+    pairs = _pairs(context.library, pixels0, pixels1, **values)
     found = context.library.make(_abi.tv_two_view)
     inliers = np.zeros(len(pixels0), np.uint8)
     context.call("tv_estimate_two_view", *_two_cameras(camera0, camera1),
@@ -463,13 +481,12 @@ def triangulate(camera0: Camera, camera1: Camera, R: Sequence[Sequence[float]],
     (between the rays), error_px, status (a PointStatus).
     Raises TypeError or ValueError for an array that C could not read, TV_ERR_ARGUMENT where R is no
     rotation or t is zero, TV_ERR_NOT_FINITE for R or t, TV_ERR_CAMERA."""
+    library = _abi.default_library()
     pixels0, pixels1 = _pixels(pixels0, pixels1)
-    rotation, translation = _abi.small_array("R", R, 3, 3), _abi.small_array("t", t, 3)
+    pairs, pair = _pairs(library, pixels0, pixels1), _pair(camera0, camera1, R, t)
     points = np.zeros(len(pixels0), _abi.POINT)
-    _abi.default_library().call(
-        "tv_triangulate", c_int32(int(method)), *_two_cameras(camera0, camera1),
-        _abi.pointer(rotation), _abi.pointer(translation), _abi.pointer(pixels0),
-        _abi.pointer(pixels1), c_int32(len(pixels0)), _abi.pointer(points))
+    library.call("tv_triangulate", _by_reference(pair), byref(pairs), c_int32(int(method)),
+                 _abi.pointer(points))
     return points
 
 
@@ -483,15 +500,13 @@ def correct_matches(camera0: Camera, camera1: Camera, R: Sequence[Sequence[float
     Returns both pixels (n, 2) float64, distorted as they were, and a (n,) bool array that is True
     for a match that was moved; the pixels of others are zeros.
     Raises as triangulate does."""
+    library = _abi.default_library()
     pixels0, pixels1 = _pixels(pixels0, pixels1)
-    rotation, translation = _abi.small_array("R", R, 3, 3), _abi.small_array("t", t, 3)
+    pairs, pair = _pairs(library, pixels0, pixels1), _pair(camera0, camera1, R, t)
     corrected0, corrected1 = np.empty_like(pixels0), np.empty_like(pixels1)
     valid = np.empty(len(pixels0), np.uint8)
-    _abi.default_library().call(
-        "tv_correct_matches", c_int32(int(cost)), *_two_cameras(camera0, camera1),
-        _abi.pointer(rotation), _abi.pointer(translation), _abi.pointer(pixels0),
-        _abi.pointer(pixels1), c_int32(len(pixels0)), _abi.pointer(corrected0),
-        _abi.pointer(corrected1), _abi.pointer(valid))
+    library.call("tv_correct_matches", _by_reference(pair), byref(pairs), c_int32(int(cost)),
+                 _abi.pointer(corrected0), _abi.pointer(corrected1), _abi.pointer(valid))
     return corrected0, corrected1, valid.view(bool)
 
 
@@ -536,22 +551,20 @@ def adjust_two_view(context: Context, camera0: Camera, camera1: Camera, pixels0:
     than the context's max_matches."""
     wanted = to_struct(check_context(context).library, BundleOptions, options, keywords)
     pixels0, pixels1 = _pixels(pixels0, pixels1)
-    rotation, translation = (
-        _abi.small_array("R", R, 3, 3).copy(),
-        _abi.small_array("t", t, 3).copy(),
-    )
+    pair = _pair(camera0, camera1, R, t)
     points = _abi.check_array("points", points, _abi.POINT).copy()
     if len(points) != len(pixels0):
         raise ValueError(f"{len(points)} points and {len(pixels0)} matches")
     result = context.library.make(_abi.tv_bundle_result)
-    pairs = _pairs(context, pixels0, pixels1, sigmas0=sigmas0, sigmas1=sigmas1)
-    context.call("tv_adjust_two_view", *_two_cameras(camera0, camera1),
-                 byref(pairs), byref(wanted), _abi.pointer(rotation),
-                 _abi.pointer(translation), _abi.pointer(points), byref(result))
+    pairs = _pairs(context.library, pixels0, pixels1, sigmas0=sigmas0, sigmas1=sigmas1)
+    context.call("tv_adjust_two_view", byref(pairs), byref(wanted), _by_reference(pair),
+                 _abi.pointer(points), byref(result))
     covariance = np.array(result.covariance).reshape(5, 5) if result.has_covariance else None
-    return BundleResult(rotation, translation, points, result.num_points, result.num_iterations,
-                        bool(result.converged), result.initial_cost, result.final_cost,
-                        result.initial_rms_px, result.rms_px, covariance, result.noise_px)
+    return BundleResult(np.array(pair.cam1_from_cam0_R).reshape(3, 3),
+                        np.array(pair.cam1_from_cam0_t), points, result.num_points,
+                        result.num_iterations, bool(result.converged), result.initial_cost,
+                        result.final_cost, result.initial_rms_px, result.rms_px, covariance,
+                        result.noise_px)
 
 
 def point_covariances(camera0: Camera, camera1: Camera, R: Sequence[Sequence[float]],
@@ -565,15 +578,14 @@ def point_covariances(camera0: Camera, camera1: Camera, R: Sequence[Sequence[flo
     TwoView or BundleResult.
     Returns (n, 3, 3) float64 in camera 0's frame, in the unit of t squared; zeros where unknown.
     Raises as triangulate does."""
-    rotation, translation = _abi.small_array("R", R, 3, 3), _abi.small_array("t", t, 3)
+    pair = _pair(camera0, camera1, R, t)
     points = _abi.check_array("points", points, _abi.POINT)
     given = pose_covariance
     pose = None if given is None else _abi.small_array("pose_covariance", given, 5, 5)
     covariances = np.zeros((len(points), 3, 3))
     _abi.default_library().call(
-        "tv_point_covariances", *_two_cameras(camera0, camera1), _abi.pointer(rotation),
-        _abi.pointer(translation), _abi.pointer(pose), ctypes.c_double(noise_px),
-        _abi.pointer(points), c_int32(len(points)), _abi.pointer(covariances))
+        "tv_point_covariances", _by_reference(pair), _abi.pointer(points), c_int32(len(points)),
+        ctypes.c_double(noise_px), _abi.pointer(pose), _abi.pointer(covariances))
     return covariances
 
 

@@ -91,7 +91,7 @@ def adjust_window(cameras: Sequence[Camera], views: np.ndarray, points: np.ndarr
     found = np.zeros((len(views), 6, 6)) if covariances else None
     errors = np.empty(len(observations), np.float32)
     result = library.make(_abi.tv_window_result)
-    library.call("tv_adjust_window", byref(window), byref(wanted), _abi.pointer(memory), size,
+    library.call("tv_adjust_window", _abi.pointer(memory), size, byref(window), byref(wanted),
                  _abi.pointer(found), _abi.pointer(errors), byref(result))
     return WindowResult(
         views, points, errors, found if result.has_covariance else None, result.num_views,

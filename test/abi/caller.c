@@ -129,9 +129,6 @@ static void init_all(void) {
   INIT(tv_bundle_options_init, &bundle);
   INIT(tv_bundle_result_init, &adjusted);
   INIT(tv_reconstruct_options_init, &options);
-#ifdef TWOVIEW_ABI_GROWN
-  options.it.align_matches = 0; /* 1 by default; a caller of 0.1.0 has no alignment */
-#endif
   INIT(tv_reconstruction_init, &cloud);
   for (v = 0; v < 2; ++v) {
     INIT(tv_features_init, &features[v]);
@@ -158,7 +155,8 @@ static tv_context *make_context(void) {
 static int run_stages(tv_context *context, const tv_camera *camera) {
   int32_t num_matches = 0, num_guided = 0, v, k;
   uint64_t times[TV_NUM_STAGES + 2];
-  tv_camera corrected;
+  tv_camera_pair corrected;
+  tv_epipolar epipolar;
   for (v = 0; v < 2; ++v) {
     tv_image image;
     image.data = images[v];
@@ -171,7 +169,7 @@ static int run_stages(tv_context *context, const tv_camera *camera) {
     views[v].it.image = image;
     views[v].it.camera = camera;
   }
-  REFUSES_UNKNOWN(feature.it, tv_describe(context, &views[0].it.image, &feature.it, keypoints[0], 1,
+  REFUSES_UNKNOWN(feature.it, tv_describe(context, &views[0].it.image, keypoints[0], 1, &feature.it,
                                           descriptors[0]));
   CHECK(tv_match(context, &features[0].it, &features[1].it, &match.it, matches, CAP,
                  &num_matches) == TV_OK);
@@ -200,27 +198,28 @@ static int run_stages(tv_context *context, const tv_camera *camera) {
                                                     &estimate.it, &pose.it, mask));
   REFUSES_UNKNOWN(pairs.it, tv_estimate_two_view(context, camera, camera, &pairs.it, &estimate.it,
                                                  &pose.it, mask));
-  CHECK(tv_corrected_camera(&pose.it, camera, &corrected) == TV_OK);
-  REFUSES_UNKNOWN(pose.it, tv_corrected_camera(&pose.it, camera, &corrected));
-  CHECK(tv_match_guided(context, &corrected, &corrected, pose.it.E, &features[0].it,
-                        &features[1].it, &along.it, guided, CAP, &num_guided) == TV_OK);
-  REFUSES_UNKNOWN(along.it,
-                  tv_match_guided(context, &corrected, &corrected, pose.it.E, &features[0].it,
-                                  &features[1].it, &along.it, guided, CAP, &num_guided));
-  CHECK(tv_triangulate(TV_TRIANGULATION_POLY, &corrected, &corrected, pose.it.R, pose.it.t,
-                       pixels[0], pixels[1], num_matches, points) == TV_OK);
+  CHECK(tv_corrected_pair(&pose.it, camera, camera, &corrected) == TV_OK);
+  REFUSES_UNKNOWN(pose.it, tv_corrected_pair(&pose.it, camera, camera, &corrected));
+  epipolar.camera0 = &corrected.camera0;
+  epipolar.camera1 = &corrected.camera1;
+  memcpy(epipolar.matrix, pose.it.E, sizeof epipolar.matrix);
+  CHECK(tv_match_guided(context, &epipolar, &features[0].it, &features[1].it, &along.it, guided,
+                        CAP, &num_guided) == TV_OK);
+  REFUSES_UNKNOWN(along.it, tv_match_guided(context, &epipolar, &features[0].it, &features[1].it,
+                                            &along.it, guided, CAP, &num_guided));
+  CHECK(tv_triangulate(&corrected, &pairs.it, TV_TRIANGULATION_POLY, points) == TV_OK);
+  REFUSES_UNKNOWN(pairs.it, tv_triangulate(&corrected, &pairs.it, TV_TRIANGULATION_POLY, points));
   SPOIL_GROWN(adjusted.it);
-  CHECK(tv_adjust_two_view(context, &corrected, &corrected, &pairs.it, &bundle.it, pose.it.R,
-                           pose.it.t, points, &adjusted.it) == TV_OK);
+  CHECK(tv_adjust_two_view(context, &pairs.it, &bundle.it, &corrected, points, &adjusted.it) ==
+        TV_OK);
   CHECK_GROWN_ZERO(adjusted.it);
   GUARDS_HOLD(&adjusted);
   printf("stages: %d and %d keypoints, %d matches, %d guided, %s %s, %d inliers, %a %a %a, %a\n",
          (int)features[0].it.num, (int)features[1].it.num, (int)num_matches, (int)num_guided,
          tv_kind_string((tv_kind)pose.it.kind), tv_verdict_string((tv_verdict)pose.it.verdict),
          (int)pose.it.num_inliers, pose.it.t[0], pose.it.t[1], pose.it.t[2], adjusted.it.rms_px);
-  REFUSES_UNKNOWN(bundle.it,
-                  tv_adjust_two_view(context, &corrected, &corrected, &pairs.it, &bundle.it,
-                                     pose.it.R, pose.it.t, points, &adjusted.it));
+  REFUSES_UNKNOWN(bundle.it, tv_adjust_two_view(context, &pairs.it, &bundle.it, &corrected, points,
+                                                &adjusted.it));
   memset(times, PATTERN, sizeof times);
   CHECK(tv_context_take_times(context, times, TV_NUM_STAGES + 1) == TV_OK);
   CHECK(times[TV_NUM_STAGES] == 0 && is_pattern((uint8_t *)&times[TV_NUM_STAGES + 1], 8));

@@ -83,8 +83,8 @@ void setUp(void) {
 void tearDown(void) { api_release(&a); }
 
 static tv_status align(void) {
-  return tv_align_matches(a.context, &images[0], &images[1], 4, moved[0], num[0], moved[1], num[1],
-                          matches, num_matches, aligned);
+  return align_keypoints_of(a.context, images[0], images[1], matches, num_matches, 4, moved[0],
+                            num[0], moved[1], num[1], aligned);
 }
 
 static void untouched(void) { TEST_ASSERT_TRUE(api_is_pattern(aligned, sizeof aligned)); }
@@ -146,8 +146,8 @@ static void test_exchanged_images_give_the_same_positions(void) {
     matches[k].idx1 = idx0;
   }
   TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_align_matches(a.context, &images[1], &images[0], 4, again[1], num[1], again[0],
-                              num[0], matches, num_matches, mask));
+      TV_OK, align_keypoints_of(a.context, images[1], images[0], matches, num_matches, 4, again[1],
+                                num[1], again[0], num[0], mask));
   TEST_ASSERT_EQUAL_MEMORY(moved, again, sizeof again);
   TEST_ASSERT_EQUAL_MEMORY(aligned, mask, (size_t)num_matches);
 }
@@ -155,46 +155,47 @@ static void test_exchanged_images_give_the_same_positions(void) {
 static void test_wrong_arguments_are_refused_and_nothing_is_written(void) {
   const float bad_sizes[] = {0, -1, 4097, (float)NAN, (float)INFINITY};
   const int32_t index = matches[5].idx1;
+  tv_keypoint *const both[2] = {moved[0], moved[1]};
   tv_image image = images[1];
   size_t k;
 
   TEST_ASSERT_EQUAL_INT(
-      TV_ERR_NULL, tv_align_matches(NULL, &images[0], &images[1], 4, moved[0], num[0], moved[1],
-                                    num[1], matches, num_matches, aligned));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
-                        tv_align_matches(a.context, NULL, &images[1], 4, moved[0], num[0], moved[1],
-                                         num[1], matches, num_matches, aligned));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
-                        tv_align_matches(a.context, &images[0], NULL, 4, moved[0], num[0], moved[1],
-                                         num[1], matches, num_matches, aligned));
+      TV_ERR_NULL, align_keypoints_of(NULL, images[0], images[1], matches, num_matches, 4, moved[0],
+                                      num[0], moved[1], num[1], aligned));
   TEST_ASSERT_EQUAL_INT(
-      TV_ERR_NULL, tv_align_matches(a.context, &images[0], &images[1], 4, NULL, num[0], moved[1],
-                                    num[1], matches, num_matches, aligned));
+      TV_ERR_NULL, tv_align_matches(a.context, NULL, matches, num_matches, 4, both, num, aligned));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_align_matches(a.context, images, matches, num_matches, 4,
+                                                      NULL, num, aligned));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_align_matches(a.context, images, matches, num_matches, 4,
+                                                      both, NULL, aligned));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
+                        align_keypoints_of(a.context, images[0], images[1], matches, num_matches, 4,
+                                           NULL, num[0], moved[1], num[1], aligned));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
+                        align_keypoints_of(a.context, images[0], images[1], matches, num_matches, 4,
+                                           moved[0], num[0], NULL, num[1], aligned));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
+                        align_keypoints_of(a.context, images[0], images[1], NULL, num_matches, 4,
+                                           moved[0], num[0], moved[1], num[1], aligned));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
+                        align_keypoints_of(a.context, images[0], images[1], matches, num_matches, 4,
+                                           moved[0], num[0], moved[1], num[1], NULL));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT,
+                        align_keypoints_of(a.context, images[0], images[1], matches, num_matches, 4,
+                                           moved[0], -1, moved[1], num[1], aligned));
   TEST_ASSERT_EQUAL_INT(
-      TV_ERR_NULL, tv_align_matches(a.context, &images[0], &images[1], 4, moved[0], num[0], NULL,
-                                    num[1], matches, num_matches, aligned));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
-                        tv_align_matches(a.context, &images[0], &images[1], 4, moved[0], num[0],
-                                         moved[1], num[1], NULL, num_matches, aligned));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
-                        tv_align_matches(a.context, &images[0], &images[1], 4, moved[0], num[0],
-                                         moved[1], num[1], matches, num_matches, NULL));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT,
-                        tv_align_matches(a.context, &images[0], &images[1], 4, moved[0], -1,
-                                         moved[1], num[1], matches, num_matches, aligned));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT,
-                        tv_align_matches(a.context, &images[0], &images[1], 4, moved[0], num[0],
-                                         moved[1], num[1], matches, -1, aligned));
+      TV_ERR_ARGUMENT, align_keypoints_of(a.context, images[0], images[1], matches, -1, 4, moved[0],
+                                          num[0], moved[1], num[1], aligned));
   for (k = 0; k < sizeof bad_sizes / sizeof bad_sizes[0]; ++k) {
     TEST_ASSERT_EQUAL_INT(
         isfinite(bad_sizes[k]) ? TV_ERR_ARGUMENT : TV_ERR_NOT_FINITE,
-        tv_align_matches(a.context, &images[0], &images[1], bad_sizes[k], moved[0], num[0],
-                         moved[1], num[1], matches, num_matches, aligned));
+        align_keypoints_of(a.context, images[0], images[1], matches, num_matches, bad_sizes[k],
+                           moved[0], num[0], moved[1], num[1], aligned));
   }
   image.width = WIDTH + 1;
-  TEST_ASSERT_EQUAL_INT(
-      TV_ERR_LIMITS, tv_align_matches(a.context, &images[0], &image, 4, moved[0], num[0], moved[1],
-                                      num[1], matches, num_matches, aligned));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_LIMITS,
+                        align_keypoints_of(a.context, images[0], image, matches, num_matches, 4,
+                                           moved[0], num[0], moved[1], num[1], aligned));
   matches[5].idx1 = num[1];
   TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, align());
   matches[5].idx1 = -1;
@@ -207,25 +208,25 @@ static void test_wrong_arguments_are_refused_and_nothing_is_written(void) {
   TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, align());
   moved[0][2].size = found[0][2].size;
   TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
-                        tv_align_matches(a.context, &images[0], &images[1], 4, moved[0], num[0],
-                                         moved[0] + 1, num[0] - 1, matches, 0, NULL));
-  TEST_ASSERT_EQUAL_INT(
-      TV_ERR_OVERLAP, tv_align_matches(a.context, &images[0], &images[1], 4, moved[0], num[0],
-                                       moved[1], num[1], matches, num_matches, (uint8_t *)matches));
+                        align_keypoints_of(a.context, images[0], images[1], matches, 0, 4, moved[0],
+                                           num[0], moved[0] + 1, num[0] - 1, NULL));
   TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
-                        tv_align_matches(a.context, &images[0], &images[1], 4, moved[0], num[0],
-                                         moved[1], num[1], matches, num_matches, pixels[1] + 7));
+                        align_keypoints_of(a.context, images[0], images[1], matches, num_matches, 4,
+                                           moved[0], num[0], moved[1], num[1], (uint8_t *)matches));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
+                        align_keypoints_of(a.context, images[0], images[1], matches, num_matches, 4,
+                                           moved[0], num[0], moved[1], num[1], pixels[1] + 7));
   untouched();
   TEST_ASSERT_EQUAL_MEMORY(found, moved, sizeof found);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_align_matches(a.context, &images[0], &images[1], 4, NULL, 0, NULL,
-                                                0, NULL, 0, NULL));
+  TEST_ASSERT_EQUAL_INT(TV_OK, align_keypoints_of(a.context, images[0], images[1], NULL, 0, 4, NULL,
+                                                  0, NULL, 0, NULL));
 }
 
 static void test_a_context_that_is_made_for_other_calls_is_refused(void) {
   api_context other = make_context(TV_PURPOSE_MATCH);
-  TEST_ASSERT_EQUAL_INT(TV_ERR_LIMITS,
-                        tv_align_matches(other.context, &images[0], &images[1], 4, moved[0], num[0],
-                                         moved[1], num[1], matches, num_matches, aligned));
+  TEST_ASSERT_EQUAL_INT(
+      TV_ERR_LIMITS, align_keypoints_of(other.context, images[0], images[1], matches, num_matches,
+                                        4, moved[0], num[0], moved[1], num[1], aligned));
   untouched();
   api_release(&other);
 }

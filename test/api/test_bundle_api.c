@@ -8,8 +8,7 @@
 
 #define NUM_POINTS 20
 
-static tv_camera camera0, camera1;
-static double R[9], t[3], start_R[9], start_t[3];
+static tv_camera_pair pair, start_pair;
 static double pixels0[2 * NUM_POINTS], pixels1[2 * NUM_POINTS];
 static tv_point points[NUM_POINTS + 1], start[NUM_POINTS + 1];
 static tv_bundle_options options;
@@ -20,32 +19,32 @@ static api_context a;
 /* Twenty points at depths of 4 to 10, which are about 2 to 5 baselines; pixels are rounded down
    to multiples of 0.5, which is the noise. */
 void setUp(void) {
+  const double t[3] = {-2, 0, 0.5};
   uint64_t seed = 1;
   int i, k;
   tv_limits limits;
-  memset(&camera0, 0, sizeof camera0);
-  camera0.model = TV_CAMERA_PINHOLE;
-  camera0.width = 640, camera0.height = 480;
-  camera0.fx = camera0.fy = 500, camera0.cx = 320, camera0.cy = 240;
-  camera1 = camera0;
-  for (i = 0; i < 9; ++i) R[i] = i % 4 == 0;
-  t[0] = -2, t[1] = 0, t[2] = 0.5;
+  memset(&pair, 0, sizeof pair);
+  pair.camera0.model = TV_CAMERA_PINHOLE;
+  pair.camera0.width = 640, pair.camera0.height = 480;
+  pair.camera0.fx = pair.camera0.fy = 500, pair.camera0.cx = 320, pair.camera0.cy = 240;
+  pair.camera1 = pair.camera0;
+  for (i = 0; i < 9; ++i) pair.cam1_from_cam0_R[i] = i % 4 == 0;
+  memcpy(pair.cam1_from_cam0_t, t, sizeof t);
   memset(start, 0x5a, sizeof start);
   for (i = 0; i < NUM_POINTS; ++i) {
     const double z = 4 + 6 * random_unit(&seed);
     const double X[3] = {z * (random_unit(&seed) - 0.3), z * (random_unit(&seed) - 0.5) * 0.8, z};
     const double moved[3] = {X[0] + t[0], X[1], X[2] + t[2]};
-    TEST_ASSERT_EQUAL_INT(TV_OK, tv_camera_project(&camera0, X, pixels0 + 2 * i, NULL));
-    TEST_ASSERT_EQUAL_INT(TV_OK, tv_camera_project(&camera1, moved, pixels1 + 2 * i, NULL));
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_camera_project(&pair.camera0, X, pixels0 + 2 * i, NULL));
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_camera_project(&pair.camera1, moved, pixels1 + 2 * i, NULL));
     for (k = 0; k < 2; ++k) {
       pixels0[2 * i + k] = floor(2 * pixels0[2 * i + k]) / 2;
       pixels1[2 * i + k] = floor(2 * pixels1[2 * i + k]) / 2;
     }
   }
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_triangulate(TV_TRIANGULATION_MIDPOINT, &camera0, &camera1, R, t,
-                                              pixels0, pixels1, NUM_POINTS, start));
-  memcpy(start_R, R, sizeof R);
-  memcpy(start_t, t, sizeof t);
+  TEST_ASSERT_EQUAL_INT(TV_OK, triangulate_pixels(&pair, pixels0, pixels1, NUM_POINTS,
+                                                  TV_TRIANGULATION_MIDPOINT, start));
+  start_pair = pair;
   memcpy(points, start, sizeof points);
   tv_bundle_options_init(&options);
   tv_bundle_result_init(&result);
@@ -58,13 +57,11 @@ void setUp(void) {
 void tearDown(void) { api_release(&a); }
 
 static tv_status run(void) {
-  return adjust_pixels(a.context, &camera0, &camera1, pixels0, pixels1, NUM_POINTS, &options, R, t,
-                       points, &result);
+  return adjust_pixels(a.context, pixels0, pixels1, NUM_POINTS, &options, &pair, points, &result);
 }
 
 static void expect_untouched(void) {
-  TEST_ASSERT_EQUAL_MEMORY(start_R, R, sizeof R);
-  TEST_ASSERT_EQUAL_MEMORY(start_t, t, sizeof t);
+  TEST_ASSERT_EQUAL_MEMORY(&start_pair, &pair, sizeof pair);
   TEST_ASSERT_EQUAL_MEMORY(start, points, sizeof points);
   TEST_ASSERT_EQUAL_MEMORY(&start_result, &result, sizeof result);
 }
@@ -75,6 +72,7 @@ static void expect_refusal(tv_status expected) {
 }
 
 static void test_adjusts_pose_and_points(void) {
+  const double *const t = pair.cam1_from_cam0_t;
   int i;
   TEST_ASSERT_EQUAL_INT(TV_OK, run());
   TEST_ASSERT_EQUAL_INT(NUM_POINTS, result.num_points);
@@ -85,6 +83,7 @@ static void test_adjusts_pose_and_points(void) {
   TEST_ASSERT_TRUE(result.noise_px > 0.05 && result.noise_px < 0.5);
   TEST_ASSERT_TRUE(result.num_iterations > 0 && result.num_iterations <= 50);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 4.25, t[0] * t[0] + t[1] * t[1] + t[2] * t[2]);
+  TEST_ASSERT_EQUAL_MEMORY(&start_pair.camera0, &pair.camera0, 2 * sizeof pair.camera0);
   for (i = 0; i < NUM_POINTS; ++i) TEST_ASSERT_EQUAL_INT(TV_POINT_OK, points[i].status);
   TEST_ASSERT_EQUAL_MEMORY(&start[NUM_POINTS], &points[NUM_POINTS], sizeof(tv_point));
 }
@@ -93,10 +92,10 @@ static void test_defaults_and_no_result_are_fine(void) {
   tv_point by_default[NUM_POINTS + 1];
   TEST_ASSERT_EQUAL_INT(TV_OK, run());
   memcpy(by_default, points, sizeof points);
-  memcpy(R, start_R, sizeof R), memcpy(t, start_t, sizeof t);
+  pair = start_pair;
   memcpy(points, start, sizeof points);
-  TEST_ASSERT_EQUAL_INT(TV_OK, adjust_pixels(a.context, &camera0, &camera1, pixels0, pixels1,
-                                             NUM_POINTS, NULL, R, t, points, NULL));
+  TEST_ASSERT_EQUAL_INT(
+      TV_OK, adjust_pixels(a.context, pixels0, pixels1, NUM_POINTS, NULL, &pair, points, NULL));
   TEST_ASSERT_EQUAL_MEMORY(by_default, points, sizeof points);
 }
 
@@ -104,8 +103,7 @@ static void test_no_iterations_only_measure(void) {
   int i, k;
   options.max_iterations = 0;
   TEST_ASSERT_EQUAL_INT(TV_OK, run());
-  TEST_ASSERT_EQUAL_MEMORY(start_R, R, sizeof R);
-  TEST_ASSERT_EQUAL_MEMORY(start_t, t, sizeof t);
+  TEST_ASSERT_EQUAL_MEMORY(&start_pair, &pair, sizeof pair);
   TEST_ASSERT_EQUAL_INT(0, result.num_iterations);
   TEST_ASSERT_FALSE(result.converged);
   TEST_ASSERT_EQUAL_DOUBLE(result.initial_cost, result.final_cost);
@@ -119,12 +117,11 @@ static void test_no_iterations_only_measure(void) {
 }
 
 static void test_no_points_are_fine(void) {
-  TEST_ASSERT_EQUAL_INT(TV_OK, adjust_pixels(a.context, &camera0, &camera1, NULL, NULL, 0, NULL, R,
-                                             t, NULL, &result));
+  TEST_ASSERT_EQUAL_INT(TV_OK, adjust_pixels(a.context, NULL, NULL, 0, NULL, &pair, NULL, &result));
   TEST_ASSERT_EQUAL_INT(0, result.num_points);
   TEST_ASSERT_EQUAL_DOUBLE(0, result.rms_px);
   TEST_ASSERT_FALSE(result.has_covariance);
-  TEST_ASSERT_EQUAL_MEMORY(start_R, R, sizeof R);
+  TEST_ASSERT_EQUAL_MEMORY(&start_pair, &pair, sizeof pair);
 }
 
 static void test_null_pointers_are_refused(void) {
@@ -132,22 +129,12 @@ static void test_null_pointers_are_refused(void) {
   const int n = NUM_POINTS;
   tv_bundle_options *o = &options;
   tv_bundle_result *r = &result;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, adjust_pixels(NULL, &camera0, &camera1, pixels0, pixels1, n, o,
-                                                   R, t, points, r));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
-                        adjust_pixels(c, NULL, &camera1, pixels0, pixels1, n, o, R, t, points, r));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
-                        adjust_pixels(c, &camera0, NULL, pixels0, pixels1, n, o, R, t, points, r));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
-                        adjust_pixels(c, &camera0, &camera1, NULL, pixels1, n, o, R, t, points, r));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
-                        adjust_pixels(c, &camera0, &camera1, pixels0, NULL, n, o, R, t, points, r));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, adjust_pixels(c, &camera0, &camera1, pixels0, pixels1, n, o,
-                                                   NULL, t, points, r));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, adjust_pixels(c, &camera0, &camera1, pixels0, pixels1, n, o, R,
-                                                   NULL, points, r));
-  TEST_ASSERT_EQUAL_INT(
-      TV_ERR_NULL, adjust_pixels(c, &camera0, &camera1, pixels0, pixels1, n, o, R, t, NULL, r));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, adjust_pixels(NULL, pixels0, pixels1, n, o, &pair, points, r));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_adjust_two_view(c, NULL, o, &pair, points, r));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, adjust_pixels(c, NULL, pixels1, n, o, &pair, points, r));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, adjust_pixels(c, pixels0, NULL, n, o, &pair, points, r));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, adjust_pixels(c, pixels0, pixels1, n, o, NULL, points, r));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, adjust_pixels(c, pixels0, pixels1, n, o, &pair, NULL, r));
   expect_untouched();
   tv_bundle_options_init(NULL);
   tv_bundle_result_init(NULL);
@@ -169,24 +156,29 @@ static void test_options_out_of_range_are_refused(void) {
   expect_refusal(TV_ERR_STRUCT_SIZE);
 }
 
+/* That the present pair is refused and stays as it is; then it is as setUp made it. */
+static void expect_pair_refused(tv_status expected) {
+  const tv_camera_pair good = start_pair;
+  start_pair = pair;
+  expect_refusal(expected);
+  pair = start_pair = good;
+}
+
 static void test_poses_cameras_and_counts_are_checked(void) {
-  const tv_camera good = camera1;
-  R[0] = start_R[0] = 1 + 1e-5, expect_refusal(TV_ERR_ARGUMENT);
-  R[0] = start_R[0] = 1;
-  R[5] = start_R[5] = NAN, expect_refusal(TV_ERR_NOT_FINITE);
-  R[5] = start_R[5] = 0;
-  t[1] = start_t[1] = INFINITY, expect_refusal(TV_ERR_NOT_FINITE);
-  memset(t, 0, sizeof t), memset(start_t, 0, sizeof t), expect_refusal(TV_ERR_ARGUMENT);
-  t[0] = t[1] = t[2] = start_t[0] = start_t[1] = start_t[2] = 1.5e308;
-  expect_refusal(TV_ERR_ARGUMENT); /* the length of t overflows to infinity */
-  t[0] = start_t[0] = -1e-300, t[1] = t[2] = start_t[1] = start_t[2] = 0;
-  camera1.fx = 0, expect_refusal(TV_ERR_CAMERA), camera1 = good;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT,
-                        adjust_pixels(a.context, &camera0, &camera1, pixels0, pixels1, -1, &options,
-                                      R, t, points, &result));
-  TEST_ASSERT_EQUAL_INT(
-      TV_ERR_LIMITS, adjust_pixels(a.context, &camera0, &camera1, pixels0, pixels1, NUM_POINTS + 1,
-                                   &options, R, t, points, &result));
+  double *const R = pair.cam1_from_cam0_R, *const t = pair.cam1_from_cam0_t;
+  R[0] = 1 + 1e-5, expect_pair_refused(TV_ERR_ARGUMENT);
+  R[5] = NAN, expect_pair_refused(TV_ERR_NOT_FINITE);
+  t[1] = INFINITY, expect_pair_refused(TV_ERR_NOT_FINITE);
+  t[0] = t[1] = t[2] = 0, expect_pair_refused(TV_ERR_ARGUMENT);
+  /* The length of t overflows to infinity. */
+  t[0] = t[1] = t[2] = 1.5e308, expect_pair_refused(TV_ERR_ARGUMENT);
+  t[0] = -1e-300, t[1] = t[2] = 0;
+  pair.camera1.fx = 0, expect_pair_refused(TV_ERR_CAMERA);
+  pair.camera0.fy = 0, expect_pair_refused(TV_ERR_CAMERA);
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, adjust_pixels(a.context, pixels0, pixels1, -1, &options,
+                                                       &pair, points, &result));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_LIMITS, adjust_pixels(a.context, pixels0, pixels1, NUM_POINTS + 1,
+                                                     &options, &pair, points, &result));
   expect_untouched();
 }
 
@@ -201,9 +193,9 @@ static void test_sigmas_are_checked(void) {
     pairs.sigmas1 = v == 1 ? sigmas : NULL;
     for (k = 0; k < (int)(sizeof bad / sizeof bad[0]); ++k) {
       sigmas[NUM_POINTS - 1] = bad[k];
-      TEST_ASSERT_EQUAL_INT(isfinite(bad[k]) ? TV_ERR_ARGUMENT : TV_ERR_NOT_FINITE,
-                            tv_adjust_two_view(a.context, &camera0, &camera1, &pairs, &options, R,
-                                               t, points, &result));
+      TEST_ASSERT_EQUAL_INT(
+          isfinite(bad[k]) ? TV_ERR_ARGUMENT : TV_ERR_NOT_FINITE,
+          tv_adjust_two_view(a.context, &pairs, &options, &pair, points, &result));
       expect_untouched();
     }
     sigmas[NUM_POINTS - 1] = 1;
@@ -212,39 +204,38 @@ static void test_sigmas_are_checked(void) {
   memset(start, 0x40, sizeof start);
   memcpy(points, start, sizeof points);
   pairs.sigmas1 = (const float *)points;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_adjust_two_view(a.context, &camera0, &camera1, &pairs,
-                                                           &options, R, t, points, &result));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
+                        tv_adjust_two_view(a.context, &pairs, &options, &pair, points, &result));
   expect_untouched();
 }
 
 static void test_outputs_may_not_overlap(void) {
   tv_context *c = a.context;
   double *inside = (double *)points;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, adjust_pixels(c, &camera0, &camera1, inside, pixels1,
-                                                      NUM_POINTS, &options, R, t, points, &result));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, adjust_pixels(c, &camera0, &camera1, pixels0, inside,
-                                                      NUM_POINTS, &options, R, t, points, &result));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
-                        adjust_pixels(c, &camera0, &camera1, pixels0, pixels1, NUM_POINTS, &options,
-                                      R, R + 6, points, &result));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, adjust_pixels(c, &camera0, &camera1, pixels0, R, 2,
-                                                      &options, R, t, points, &result));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, adjust_pixels(c, inside, pixels1, NUM_POINTS, &options,
+                                                      &pair, points, &result));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, adjust_pixels(c, pixels0, inside, NUM_POINTS, &options,
+                                                      &pair, points, &result));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, adjust_pixels(c, pixels0, pair.cam1_from_cam0_R, 2,
+                                                      &options, &pair, points, &result));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, adjust_pixels(c, pixels0, pixels1, 1, &options, &pair,
+                                                      (tv_point *)(void *)&pair.camera1, &result));
   expect_untouched();
-  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_point_covariances(&camera0, &camera1, R, t, NULL, 0.5,
-                                                             points, NUM_POINTS, (double *)points));
+  TEST_ASSERT_EQUAL_INT(
+      TV_ERR_OVERLAP, tv_point_covariances(&pair, points, NUM_POINTS, 0.5, NULL, (double *)points));
   expect_untouched();
 }
 
 static void test_covariances_are_symmetric_grow_with_the_pose_and_scale_with_t(void) {
-  double with_pose[9 * NUM_POINTS], doubled[9 * NUM_POINTS], t2[3];
+  double with_pose[9 * NUM_POINTS], doubled[9 * NUM_POINTS];
   int i, k;
   TEST_ASSERT_EQUAL_INT(TV_OK, run());
   covariances[9 * NUM_POINTS] = 77;
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_point_covariances(&camera0, &camera1, R, t, NULL, 0.5, points,
-                                                    NUM_POINTS, covariances));
+  TEST_ASSERT_EQUAL_INT(TV_OK,
+                        tv_point_covariances(&pair, points, NUM_POINTS, 0.5, NULL, covariances));
   TEST_ASSERT_EQUAL_DOUBLE(77, covariances[9 * NUM_POINTS]);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_point_covariances(&camera0, &camera1, R, t, result.covariance,
-                                                    0.5, points, NUM_POINTS, with_pose));
+  TEST_ASSERT_EQUAL_INT(
+      TV_OK, tv_point_covariances(&pair, points, NUM_POINTS, 0.5, result.covariance, with_pose));
   for (i = 0; i < NUM_POINTS; ++i) {
     const double *C = covariances + 9 * i, *D = with_pose + 9 * i;
     TEST_ASSERT_TRUE(C[0] > 0 && C[4] > 0 && C[8] > 0);
@@ -253,12 +244,11 @@ static void test_covariances_are_symmetric_grow_with_the_pose_and_scale_with_t(v
     TEST_ASSERT_EQUAL_DOUBLE(C[5], C[7]);
     TEST_ASSERT_TRUE(D[0] > C[0] && D[4] > C[4] && D[8] > C[8]);
   }
-  for (k = 0; k < 3; ++k) t2[k] = 2 * t[k];
+  for (k = 0; k < 3; ++k) pair.cam1_from_cam0_t[k] *= 2;
   for (i = 0; i < NUM_POINTS; ++i) {
     for (k = 0; k < 3; ++k) points[i].position[k] *= 2;
   }
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_point_covariances(&camera0, &camera1, R, t2, NULL, 0.5, points,
-                                                    NUM_POINTS, doubled));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_point_covariances(&pair, points, NUM_POINTS, 0.5, NULL, doubled));
   for (k = 0; k < 9 * NUM_POINTS; ++k) {
     TEST_ASSERT_DOUBLE_WITHIN(1e-9 * fabs(doubled[k]) + 1e-15, 4 * covariances[k], doubled[k]);
   }
@@ -275,8 +265,8 @@ static void test_points_that_are_not_ok_have_zero_covariance(void) {
   for (i = 0; i < 3; ++i) points[5].position[i] = (i == 0 ? 2 : i == 2 ? -0.5 : 0) * 3;
   for (i = 0; i < 3; ++i) points[6].position[i] = 0;
   for (i = 0; i < 3; ++i) points[7].position[i] *= 1e200;
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_point_covariances(&camera0, &camera1, R, t, NULL, 0.5, points,
-                                                    NUM_POINTS, covariances));
+  TEST_ASSERT_EQUAL_INT(TV_OK,
+                        tv_point_covariances(&pair, points, NUM_POINTS, 0.5, NULL, covariances));
   for (i = 0; i < NUM_POINTS; ++i) {
     const double *C = covariances + 9 * i;
     TEST_ASSERT_TRUE(i < 8 ? memcmp(zeros, C, sizeof zeros) == 0 : C[0] > 0);
@@ -288,33 +278,24 @@ static void test_covariances_check_their_arguments(void) {
   const int n = NUM_POINTS;
   memset(covariances, 0x5a, sizeof covariances);
   memcpy(untouched, covariances, sizeof untouched);
-  TEST_ASSERT_EQUAL_INT(
-      TV_ERR_NULL, tv_point_covariances(NULL, &camera1, R, t, NULL, 1, points, n, covariances));
-  TEST_ASSERT_EQUAL_INT(
-      TV_ERR_NULL, tv_point_covariances(&camera0, NULL, R, t, NULL, 1, points, n, covariances));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_point_covariances(&camera0, &camera1, NULL, t, NULL, 1,
-                                                          points, n, covariances));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_point_covariances(&camera0, &camera1, R, NULL, NULL, 1,
-                                                          points, n, covariances));
-  TEST_ASSERT_EQUAL_INT(
-      TV_ERR_NULL, tv_point_covariances(&camera0, &camera1, R, t, NULL, 1, NULL, n, covariances));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
-                        tv_point_covariances(&camera0, &camera1, R, t, NULL, 1, points, n, NULL));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_point_covariances(&camera0, &camera1, R, t, NULL, -1,
-                                                              points, n, covariances));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_point_covariances(&camera0, &camera1, R, t, NULL, 1,
-                                                              points, -1, covariances));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NOT_FINITE, tv_point_covariances(&camera0, &camera1, R, t, NULL, NAN,
-                                                                points, n, covariances));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_point_covariances(NULL, points, n, 1, NULL, covariances));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_point_covariances(&pair, NULL, n, 1, NULL, covariances));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_point_covariances(&pair, points, n, 1, NULL, NULL));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT,
+                        tv_point_covariances(&pair, points, n, -1, NULL, covariances));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT,
+                        tv_point_covariances(&pair, points, -1, 1, NULL, covariances));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NOT_FINITE,
+                        tv_point_covariances(&pair, points, n, NAN, NULL, covariances));
   pose[7] = INFINITY;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NOT_FINITE, tv_point_covariances(&camera0, &camera1, R, t, pose, 1,
-                                                                points, n, covariances));
-  R[0] = 2;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_point_covariances(&camera0, &camera1, R, t, NULL, 1,
-                                                              points, n, covariances));
-  R[0] = 1, camera0.fy = -1;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_CAMERA, tv_point_covariances(&camera0, &camera1, R, t, NULL, 1,
-                                                            points, n, covariances));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NOT_FINITE,
+                        tv_point_covariances(&pair, points, n, 1, pose, covariances));
+  pair.cam1_from_cam0_R[0] = 2;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT,
+                        tv_point_covariances(&pair, points, n, 1, NULL, covariances));
+  pair.cam1_from_cam0_R[0] = 1, pair.camera0.fy = -1;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_CAMERA,
+                        tv_point_covariances(&pair, points, n, 1, NULL, covariances));
   TEST_ASSERT_EQUAL_MEMORY(untouched, covariances, sizeof untouched);
 }
 

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "support/api.h"
+#include "support/calls.h"
 #include "twoview/twoview.h"
 #include "unity.h"
 
@@ -42,6 +43,8 @@ void setUp(void) {
   for (i = 0; i < 8; ++i) sparse[i].angle_rad = SHIFT / 300.0f;
   tv_dense_options_init(&options);
   options.max_cells = 60000;
+  options.sparse = sparse;
+  options.num_sparse = 8;
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_dense_size(&camera[0], &camera[1], &options, &size_bytes));
   TEST_ASSERT_TRUE(size_bytes <= ROOM);
   memset(block, API_PATTERN, sizeof block);
@@ -55,8 +58,8 @@ void setUp(void) {
 void tearDown(void) {}
 
 static tv_status run(int32_t cap) {
-  return tv_densify(&image[0], &image[1], &camera[0], &camera[1], R, t, sparse, 8, &options, memory,
-                    size_bytes, points, cap, &num);
+  const tv_camera_pair pair = pair_of(&camera[0], &camera[1], R, t);
+  return tv_densify(memory, size_bytes, &pair, image, &options, points, cap, &num);
 }
 
 static void expect_refusal(tv_status expected) {
@@ -88,6 +91,7 @@ static void test_a_wall_is_a_wall_and_the_memory_suffices(void) {
 }
 
 static void test_room_for_fewer_gives_them_spread_evenly(void) {
+  const tv_camera_pair pair = pair_of(&camera[0], &camera[1], R, t);
   int32_t all, i, upper = 0, left = 0;
   TEST_ASSERT_EQUAL_INT(TV_OK, run(MOST));
   all = num;
@@ -101,8 +105,10 @@ static void test_room_for_fewer_gives_them_spread_evenly(void) {
   }
   TEST_ASSERT_INT_WITHIN(60, 250, upper);
   TEST_ASSERT_INT_WITHIN(60, 250, left);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_densify(&image[0], &image[1], &camera[0], &camera[1], R, t, NULL,
-                                          0, &options, memory, size_bytes, NULL, 0, &num));
+  options.sparse = NULL;
+  options.num_sparse = 0;
+  TEST_ASSERT_EQUAL_INT(TV_OK,
+                        tv_densify(memory, size_bytes, &pair, image, &options, NULL, 0, &num));
   TEST_ASSERT_EQUAL_INT(0, num);
 }
 
@@ -226,26 +232,26 @@ static void test_an_extreme_translation_gives_the_same_pixels(void) {
 
 static void test_bad_options_are_refused(void) {
   struct {
-    int32_t cells, steps, reserved;
+    int32_t cells, steps, num_sparse;
     double low, high, sigma;
     tv_status expected;
-  } const cases[] = {{1023, 128, 0, 0, 0, 0.05, TV_ERR_ARGUMENT},
-                     {(1 << 24) + 1, 128, 0, 0, 0, 0.05, TV_ERR_ARGUMENT},
-                     {60000, 15, 0, 0, 0, 0.05, TV_ERR_ARGUMENT},
-                     {60000, 513, 0, 0, 0, 0.05, TV_ERR_ARGUMENT},
-                     {60000, 128, 1, 0, 0, 0.05, TV_ERR_ARGUMENT},
-                     {60000, 128, 0, -0.1, 1, 0.05, TV_ERR_ARGUMENT},
-                     {60000, 128, 0, 0, 3.2, 0.05, TV_ERR_ARGUMENT},
-                     {60000, 128, 0, 1, 1, 0.05, TV_ERR_ARGUMENT},
-                     {60000, 128, 0, 0, 0, 0, TV_ERR_ARGUMENT},
-                     {60000, 128, 0, 0, 0, 1.01, TV_ERR_ARGUMENT},
-                     {60000, 128, 0, NAN, 0, 0.05, TV_ERR_NOT_FINITE},
-                     {60000, 128, 0, 0, INFINITY, 0.05, TV_ERR_NOT_FINITE},
-                     {60000, 128, 0, 0, 0, NAN, TV_ERR_NOT_FINITE}};
+  } const cases[] = {{1023, 128, 8, 0, 0, 0.05, TV_ERR_ARGUMENT},
+                     {(1 << 24) + 1, 128, 8, 0, 0, 0.05, TV_ERR_ARGUMENT},
+                     {60000, 15, 8, 0, 0, 0.05, TV_ERR_ARGUMENT},
+                     {60000, 513, 8, 0, 0, 0.05, TV_ERR_ARGUMENT},
+                     {60000, 128, -1, 0, 0, 0.05, TV_ERR_ARGUMENT},
+                     {60000, 128, 8, -0.1, 1, 0.05, TV_ERR_ARGUMENT},
+                     {60000, 128, 8, 0, 3.2, 0.05, TV_ERR_ARGUMENT},
+                     {60000, 128, 8, 1, 1, 0.05, TV_ERR_ARGUMENT},
+                     {60000, 128, 8, 0, 0, 0, TV_ERR_ARGUMENT},
+                     {60000, 128, 8, 0, 0, 1.01, TV_ERR_ARGUMENT},
+                     {60000, 128, 8, NAN, 0, 0.05, TV_ERR_NOT_FINITE},
+                     {60000, 128, 8, 0, INFINITY, 0.05, TV_ERR_NOT_FINITE},
+                     {60000, 128, 8, 0, 0, NAN, TV_ERR_NOT_FINITE}};
   size_t k, size = 99;
   for (k = 0; k < sizeof cases / sizeof cases[0]; ++k) {
     options.max_cells = cases[k].cells, options.max_steps = cases[k].steps;
-    options.reserved = cases[k].reserved;
+    options.num_sparse = cases[k].num_sparse;
     options.min_parallax_rad = cases[k].low, options.max_parallax_rad = cases[k].high;
     options.max_relative_sigma = cases[k].sigma;
     expect_refusal(cases[k].expected);
@@ -290,6 +296,7 @@ static void test_bad_images_cameras_and_poses_are_refused(void) {
 
 static void test_bad_memory_and_overlaps_are_refused(void) {
   uint8_t *const good = memory;
+  tv_camera_pair pair = pair_of(&camera[0], &camera[1], R, t);
   size_bytes -= 1;
   expect_refusal(TV_ERR_MEMORY);
   setUp();
@@ -297,35 +304,36 @@ static void test_bad_memory_and_overlaps_are_refused(void) {
   expect_refusal(TV_ERR_ALIGNMENT);
   setUp();
   TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, run(-1));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_densify(&image[0], &image[1], &camera[0], &camera[1], R,
-                                                   t, sparse, 8, &options, memory, size_bytes,
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_densify(memory, size_bytes, &pair, image, &options,
                                                    (tv_dense_point *)(void *)memory, 10, &num));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_densify(&image[0], &image[1], &camera[0], &camera[1], R,
-                                                   t, (tv_point *)(void *)points, 1, &options,
-                                                   memory, size_bytes, points, 10, &num));
+  options.sparse = (tv_point *)(void *)points;
+  options.num_sparse = 1;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, run(10));
+  options.sparse = sparse;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
+                        tv_densify(memory, size_bytes, &pair, image, &options,
+                                   (tv_dense_point *)(void *)&pair.cam1_from_cam0_R, 1, &num));
   image[1].data = good + 100;
   expect_refusal(TV_ERR_OVERLAP);
 }
 
 static void test_null_pointers_are_refused(void) {
+  const tv_camera_pair pair = pair_of(&camera[0], &camera[1], R, t);
   size_t size;
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_dense_size(NULL, &camera[1], &options, &size));
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_dense_size(&camera[0], NULL, &options, &size));
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_dense_size(&camera[0], &camera[1], &options, NULL));
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_dense_size(&camera[0], &camera[1], NULL, &size));
-#define CALL(a, b, c, d, e, f, g, h, i, j) \
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,       \
-                        tv_densify(a, b, c, d, e, f, g, 8, &options, h, size_bytes, i, 5, j))
-  CALL(NULL, &image[1], &camera[0], &camera[1], R, t, sparse, memory, points, &num);
-  CALL(&image[0], NULL, &camera[0], &camera[1], R, t, sparse, memory, points, &num);
-  CALL(&image[0], &image[1], NULL, &camera[1], R, t, sparse, memory, points, &num);
-  CALL(&image[0], &image[1], &camera[0], NULL, R, t, sparse, memory, points, &num);
-  CALL(&image[0], &image[1], &camera[0], &camera[1], NULL, t, sparse, memory, points, &num);
-  CALL(&image[0], &image[1], &camera[0], &camera[1], R, NULL, sparse, memory, points, &num);
-  CALL(&image[0], &image[1], &camera[0], &camera[1], R, t, NULL, memory, points, &num);
-  CALL(&image[0], &image[1], &camera[0], &camera[1], R, t, sparse, NULL, points, &num);
-  CALL(&image[0], &image[1], &camera[0], &camera[1], R, t, sparse, memory, NULL, &num);
-  CALL(&image[0], &image[1], &camera[0], &camera[1], R, t, sparse, memory, points, NULL);
+#define CALL(a, b, c, d, e) \
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_densify(a, size_bytes, b, c, &options, d, 5, e))
+  CALL(NULL, &pair, image, points, &num);
+  CALL(memory, NULL, image, points, &num);
+  CALL(memory, &pair, NULL, points, &num);
+  CALL(memory, &pair, image, NULL, &num);
+  CALL(memory, &pair, image, points, NULL);
+  options.sparse = NULL;
+  CALL(memory, &pair, image, points, &num);
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_dense_size(&camera[0], &camera[1], &options, &size));
   TEST_ASSERT_EQUAL_MEMORY(untouched, points, sizeof points);
 }
 

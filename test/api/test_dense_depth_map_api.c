@@ -61,7 +61,7 @@ void setUp(void) {
 void tearDown(void) {}
 
 static tv_status run(int32_t num_views) {
-  return tv_sweep_depth(views, num_views, &options, memory, size_bytes, &arrays);
+  return tv_sweep_depth(memory, size_bytes, views, num_views, &options, &arrays);
 }
 
 static void expect_refusal(tv_status expected) {
@@ -168,8 +168,8 @@ static void test_mistakes_are_refused_and_nothing_is_written(void) {
   arrays.sigma = NULL;
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, run(VIEWS));
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
-                        tv_sweep_depth(NULL, 3, &options, memory, size_bytes, &arrays));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_sweep_depth(views, 3, NULL, memory, size_bytes, &arrays));
+                        tv_sweep_depth(memory, size_bytes, NULL, 3, &options, &arrays));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_sweep_depth(memory, size_bytes, views, 3, NULL, &arrays));
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_depth_size(&camera, &options, NULL));
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_depth_map_camera(NULL, &options, &other));
   camera.fx = -1;

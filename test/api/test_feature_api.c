@@ -68,8 +68,8 @@ static void refused(tv_status expected, tv_context *context, const tv_image *vie
   TEST_ASSERT_EQUAL_INT(expected,
                         tv_extract(context, view, mask, o, keypoints, descriptors, CAP, &count));
   if (mask == NULL) {
-    TEST_ASSERT_EQUAL_INT(expected, tv_orient(context, view, o, &point, 1, keypoints, CAP, &count));
-    TEST_ASSERT_EQUAL_INT(expected, tv_describe(context, view, o, &point, 1, descriptors));
+    TEST_ASSERT_EQUAL_INT(expected, tv_orient(context, view, &point, 1, o, keypoints, CAP, &count));
+    TEST_ASSERT_EQUAL_INT(expected, tv_describe(context, view, &point, 1, o, descriptors));
   }
   TEST_ASSERT_EQUAL_INT(-7, count);
   TEST_ASSERT_TRUE(api_is_pattern(keypoints, sizeof keypoints));
@@ -179,19 +179,19 @@ static void test_output_pointers_are_checked(void) {
                         tv_extract(c, v, NULL, NULL, keypoints, descriptors, -1, &count));
   TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_extract(c, v, NULL, NULL, keypoints,
                                                    (uint8_t *)(keypoints + 1), CAP, &count));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_orient(c, v, NULL, NULL, 1, keypoints, CAP, &count));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_orient(c, v, NULL, &point, 1, NULL, CAP, &count));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_orient(c, v, NULL, &point, 1, keypoints, CAP, NULL));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_orient(c, v, NULL, &point, -1, keypoints, CAP, &count));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_orient(c, v, NULL, &point, 1, keypoints, -1, &count));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_orient(c, v, NULL, 1, NULL, keypoints, CAP, &count));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_orient(c, v, &point, 1, NULL, NULL, CAP, &count));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_orient(c, v, &point, 1, NULL, keypoints, CAP, NULL));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_orient(c, v, &point, -1, NULL, keypoints, CAP, &count));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_orient(c, v, &point, 1, NULL, keypoints, -1, &count));
   TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
-                        tv_orient(c, v, NULL, keypoints, 2, keypoints + 1, CAP - 1, &count));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_describe(c, v, NULL, NULL, 1, descriptors));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_describe(c, v, NULL, &point, 1, NULL));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_describe(c, v, NULL, &point, -1, descriptors));
+                        tv_orient(c, v, keypoints, 2, NULL, keypoints + 1, CAP - 1, &count));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_describe(c, v, NULL, 1, NULL, descriptors));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_describe(c, v, &point, 1, NULL, NULL));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_describe(c, v, &point, -1, NULL, descriptors));
   TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
-                        tv_describe(c, v, NULL, keypoints, 2, (uint8_t *)keypoints));
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_describe(c, v, NULL, NULL, 0, NULL));
+                        tv_describe(c, v, keypoints, 2, NULL, (uint8_t *)keypoints));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_describe(c, v, NULL, 0, NULL, NULL));
   /* an output that overlaps the image or the mask is refused */
   TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
                         tv_detect(c, &other, v, NULL, (tv_keypoint *)v->data, 1, &count));
@@ -200,8 +200,8 @@ static void test_output_pointers_are_checked(void) {
   TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
                         tv_extract(c, &other, v, NULL, keypoints, (uint8_t *)v->data, 1, &count));
   TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
-                        tv_orient(c, v, NULL, &point, 1, (tv_keypoint *)v->data, 1, &count));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_describe(c, v, NULL, &point, 1, (uint8_t *)v->data));
+                        tv_orient(c, v, &point, 1, NULL, (tv_keypoint *)v->data, 1, &count));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_describe(c, v, &point, 1, NULL, (uint8_t *)v->data));
   TEST_ASSERT_EQUAL_INT(-7, count);
   TEST_ASSERT_TRUE(api_is_pattern(keypoints, sizeof keypoints));
   TEST_ASSERT_TRUE(api_is_pattern(descriptors, sizeof descriptors));
@@ -215,8 +215,8 @@ static void point_refused(tv_status expected, float x, float y, float size, floa
   points[1].size = size;
   points[1].angle_rad = angle_rad;
   TEST_ASSERT_EQUAL_INT(expected,
-                        tv_orient(a.context, &image, NULL, points, 2, keypoints, CAP, &count));
-  TEST_ASSERT_EQUAL_INT(expected, tv_describe(a.context, &image, NULL, points, 2, descriptors));
+                        tv_orient(a.context, &image, points, 2, NULL, keypoints, CAP, &count));
+  TEST_ASSERT_EQUAL_INT(expected, tv_describe(a.context, &image, points, 2, NULL, descriptors));
   TEST_ASSERT_EQUAL_INT(-7, count);
   TEST_ASSERT_TRUE(api_is_pattern(keypoints, sizeof keypoints));
   TEST_ASSERT_TRUE(api_is_pattern(descriptors, sizeof descriptors));
@@ -317,7 +317,7 @@ static void test_capacity_is_told_and_nothing_is_written(void) {
   options.orientation = TV_ORIENTATION_GRADIENT;
   detect(a.context, others);
   TEST_ASSERT_EQUAL_INT(TV_ERR_CAPACITY,
-                        tv_orient(a.context, &image, &options, others, 20, keypoints, 19, &count));
+                        tv_orient(a.context, &image, others, 20, &options, keypoints, 19, &count));
   TEST_ASSERT_TRUE(count >= 20 && api_is_pattern(keypoints, sizeof keypoints));
 }
 
@@ -351,9 +351,9 @@ static void test_extract_is_detect_orient_describe(void) {
     options.max_keypoints = 120;
     corners = detect(a.context, keypoints);
     TEST_ASSERT_EQUAL_INT(
-        TV_OK, tv_orient(a.context, &image, &options, keypoints, corners, others, CAP, &oriented));
+        TV_OK, tv_orient(a.context, &image, keypoints, corners, &options, others, CAP, &oriented));
     TEST_ASSERT_EQUAL_INT(
-        TV_OK, tv_describe(a.context, &image, &options, others, oriented, other_descriptors));
+        TV_OK, tv_describe(a.context, &image, others, oriented, &options, other_descriptors));
     options.max_keypoints = CAP; /* so many that no second orientation is left out */
     options.levels = 1;
     options.cell_px = 0;
@@ -361,9 +361,9 @@ static void test_extract_is_detect_orient_describe(void) {
     corners = detect(a.context, keypoints);
     if (corners > CAP / 2) corners = CAP / 2;
     TEST_ASSERT_EQUAL_INT(
-        TV_OK, tv_orient(a.context, &image, &options, keypoints, corners, others, CAP, &oriented));
+        TV_OK, tv_orient(a.context, &image, keypoints, corners, &options, others, CAP, &oriented));
     TEST_ASSERT_EQUAL_INT(
-        TV_OK, tv_describe(a.context, &image, &options, others, oriented, other_descriptors));
+        TV_OK, tv_describe(a.context, &image, others, oriented, &options, other_descriptors));
     TEST_ASSERT_TRUE(k == 0 ? oriented == corners : oriented > corners);
     extracted = extract(a.context, keypoints, descriptors);
     TEST_ASSERT_TRUE(extracted >= corners);
@@ -482,9 +482,9 @@ static void test_the_largest_size_is_described_in_any_image(void) {
   int32_t count = 0, k;
   for (k = 0; k < 3; ++k) {
     image = api_image(pixels, sizes[k][0], sizes[k][1], WIDTH);
-    TEST_ASSERT_EQUAL_INT(TV_OK, tv_describe(a.context, &image, &options, points, 3, descriptors));
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_describe(a.context, &image, points, 3, &options, descriptors));
     TEST_ASSERT_EQUAL_INT(
-        TV_OK, tv_orient(a.context, &image, &options, points, 3, keypoints, CAP, &count));
+        TV_OK, tv_orient(a.context, &image, points, 3, &options, keypoints, CAP, &count));
     TEST_ASSERT_TRUE(count >= 3);
   }
 }
@@ -494,9 +494,9 @@ static void test_any_point_of_a_1x1_image_is_described(void) {
       {0, 0, 4, 0, 1, 0}, {-300, 9e4f, 512, 3, 1, 0}, {0, 0, 1e-30f, 1, 1, 0}};
   int32_t count = 0;
   image = api_image(pixels, 1, 1, 1);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_describe(a.context, &image, &options, points, 3, descriptors));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_describe(a.context, &image, points, 3, &options, descriptors));
   TEST_ASSERT_EQUAL_INT(TV_OK,
-                        tv_orient(a.context, &image, &options, points, 3, keypoints, CAP, &count));
+                        tv_orient(a.context, &image, points, 3, &options, keypoints, CAP, &count));
   TEST_ASSERT_EQUAL_INT(3, count);
   for (count = 0; count < 3 * TV_DESCRIPTOR_BYTES; ++count) {
     TEST_ASSERT_EQUAL_INT(0, descriptors[count]);

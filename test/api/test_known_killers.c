@@ -127,10 +127,11 @@ static best estimate_every_way(int count) {
    have expected_status (any if that is negative). */
 static void expect_sound_points(const tv_camera *camera, const double R[9], const double t[3],
                                 int count, int expected_status) {
+  const tv_camera_pair pair = pair_of(camera, camera, R, t);
   int method, i;
   for (method = TV_TRIANGULATION_POLY; method <= TV_TRIANGULATION_MIDPOINT; ++method) {
-    TEST_ASSERT_EQUAL_INT(TV_OK, tv_triangulate((tv_triangulation)method, camera, camera, R, t,
-                                                pixels[0], pixels[1], count, points));
+    TEST_ASSERT_EQUAL_INT(TV_OK, triangulate_pixels(&pair, pixels[0], pixels[1], count,
+                                                    (tv_triangulation)method, points));
     for (i = 0; i < count; ++i) {
       TEST_ASSERT_TRUE(all_finite(points[i].position, 3));
       TEST_ASSERT_TRUE(isfinite(points[i].angle_rad) && isfinite(points[i].error_px));
@@ -279,16 +280,18 @@ static void test_opencv_24394_parallel_rays_are_points_at_infinity(void) {
 /* OpenCV 8032: recoverPose rejected points farther away than a fixed 50 baselines. */
 static void test_opencv_8032_points_beyond_fifty_baselines_count(void) {
   const double t[3] = {-1, 0, 0};
+  tv_camera_pair cameras;
   double R[9];
   int i;
   turn_about_y(0.1, R);
+  cameras = pair_of(&lenses[0], &lenses[0], R, t);
   make_scene(400, 60, 400, 0.02, R, t);
   estimate(&lenses[0], 400);
   TEST_ASSERT_TRUE(result.has_R && result.has_t);
   TEST_ASSERT_TRUE(direction_error_deg(result.t, t) < 5);
   TEST_ASSERT_GREATER_THAN_INT(390, result.num_inliers);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_triangulate(TV_TRIANGULATION_ITERATIVE_LS, &lenses[0], &lenses[0],
-                                              R, t, pixels[0], pixels[1], 400, points));
+  TEST_ASSERT_EQUAL_INT(TV_OK, triangulate_pixels(&cameras, pixels[0], pixels[1], 400,
+                                                  TV_TRIANGULATION_ITERATIVE_LS, points));
   for (i = 0; i < 400; ++i) {
     TEST_ASSERT_EQUAL_INT(TV_POINT_OK, points[i].status);
     TEST_ASSERT_TRUE(points[i].position[2] > 50 && points[i].position[2] < 600);
@@ -413,15 +416,15 @@ static void test_coordinates_that_are_no_numbers_take_no_part(void) {
 
 static void test_rays_of_no_length_and_turned_rays_are_told(void) {
   const double t[3] = {-1, 0, 0}, zero[3] = {0, 0, 0}, behind[3] = {0.1, 0.1, -1};
+  const tv_camera_pair pair = pair_of(&lenses[0], &lenses[0], still, zero);
   double pixel[2];
   int lens, i;
   for (lens = 0; lens < 3; ++lens) {
     TEST_ASSERT_EQUAL_INT(TV_ERR_OUTSIDE, tv_camera_project(&lenses[lens], zero, pixel, NULL));
   }
   TEST_ASSERT_EQUAL_INT(TV_ERR_OUTSIDE, tv_camera_project(&lenses[0], behind, pixel, NULL));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT,
-                        tv_triangulate(TV_TRIANGULATION_MIDPOINT, &lenses[0], &lenses[0], still,
-                                       zero, pixels[0], pixels[1], 1, points));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, triangulate_pixels(&pair, pixels[0], pixels[1], 1,
+                                                            TV_TRIANGULATION_MIDPOINT, points));
   for (i = 0; i < 100; ++i) { /* the sign of t is wrong, so the rays meet behind both cameras */
     const double x = uniform(220, 420), y = uniform(140, 340);
     set_match(i, x, y, x + uniform(10, 50), y);

@@ -66,7 +66,8 @@ static uint32_t calls_that_work(tv_context *context) {
   static uint8_t descriptors[CAP * TV_DESCRIPTOR_BYTES];
   static tv_correspondence matches[CAP];
   static const double E[9] = {0, 0, 0, 0, 0, -1, 0, 1, 0};
-  double R[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, t[3] = {1, 0, 0};
+  static const double R[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, t[3] = {1, 0, 0};
+  tv_camera_pair pair = pair_of(&camera, &camera, R, t);
   tv_reconstruct_options options;
   outcome o;
   int32_t count = 0, k = 0, c;
@@ -74,8 +75,8 @@ static uint32_t calls_that_work(tv_context *context) {
   uint32_t worked = 0;
   tv_reconstruct_options_init(&options);
   status[k++] = tv_detect(context, &views[0].image, NULL, NULL, keypoints, CAP, &count);
-  status[k++] = tv_orient(context, &views[0].image, NULL, keypoints, 0, keypoints, 0, &count);
-  status[k++] = tv_describe(context, &views[0].image, NULL, keypoints, 0, descriptors);
+  status[k++] = tv_orient(context, &views[0].image, keypoints, 0, NULL, keypoints, 0, &count);
+  status[k++] = tv_describe(context, &views[0].image, keypoints, 0, NULL, descriptors);
   status[k++] =
       tv_extract(context, &views[0].image, NULL, NULL, keypoints, descriptors, CAP, &count);
   status[k++] = match_rows(context, descriptors, 9, descriptors, 9, NULL, matches, CAP, &count);
@@ -84,7 +85,7 @@ static uint32_t calls_that_work(tv_context *context) {
   tv_two_view_init(&o.two_view);
   status[k++] =
       estimate_pixels(context, &camera, &camera, NULL, NULL, NULL, 0, NULL, &o.two_view, NULL);
-  status[k++] = adjust_pixels(context, &camera, &camera, NULL, NULL, 0, NULL, R, t, NULL, NULL);
+  status[k++] = adjust_pixels(context, NULL, NULL, 0, NULL, &pair, NULL, NULL);
   status[k++] = run(context, 0, &options, &o);
   options.guided_matching = 1;
   status[k++] = run(context, 0, &options, &o);
@@ -212,6 +213,7 @@ typedef struct stage_results {
 /* Runs every call that takes options, and collects the outputs. */
 static void run_stages(tv_context *context, const tv_camera *lens, int initialised,
                        stage_results *r) {
+  tv_camera_pair pair;
   enum { ROOM = 2100 };
   static double pixels[2][2 * ROOM];
   static tv_point points[ROOM];
@@ -241,10 +243,10 @@ static void run_stages(tv_context *context, const tv_camera *lens, int initialis
     TEST_ASSERT_EQUAL_INT(TV_OK, tv_extract(context, &views[v].image, NULL, f, r->keypoints[v],
                                             r->descriptors[v], ROOM, &r->num_extracted[v]));
   }
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_orient(context, &views[0].image, f, r->detected, r->num_detected,
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_orient(context, &views[0].image, r->detected, r->num_detected, f,
                                          r->oriented, ROOM, &r->num_oriented));
   TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_describe(context, &views[0].image, f, r->detected, r->num_detected, r->described));
+      TV_OK, tv_describe(context, &views[0].image, r->detected, r->num_detected, f, r->described));
   TEST_ASSERT_EQUAL_INT(
       TV_OK, match_rows(context, r->descriptors[0], r->num_extracted[0], r->descriptors[1],
                         r->num_extracted[1], initialised ? &match : NULL, r->matches, ROOM,
@@ -270,13 +272,16 @@ static void run_stages(tv_context *context, const tv_camera *lens, int initialis
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_reconstruct(context, &views[0], &views[1],
                                               initialised ? &all : NULL, &r->whole, &cloud));
   r->R[0] = r->R[4] = r->R[8] = r->t[0] = 1;
+  pair = pair_of(&camera, &camera, r->R, r->t);
   memset(points, 0, sizeof points);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_triangulate(TV_TRIANGULATION_LINEAR_LS, &camera, &camera, r->R,
-                                              r->t, pixels[0], pixels[1], r->num_matches, points));
+  TEST_ASSERT_EQUAL_INT(TV_OK, triangulate_pixels(&pair, pixels[0], pixels[1], r->num_matches,
+                                                  TV_TRIANGULATION_LINEAR_LS, points));
   tv_bundle_result_init(&r->bundle);
-  TEST_ASSERT_EQUAL_INT(
-      TV_OK, adjust_pixels(context, &camera, &camera, pixels[0], pixels[1], r->num_matches,
-                           initialised ? &bundle : NULL, r->R, r->t, points, &r->bundle));
+  TEST_ASSERT_EQUAL_INT(TV_OK,
+                        adjust_pixels(context, pixels[0], pixels[1], r->num_matches,
+                                      initialised ? &bundle : NULL, &pair, points, &r->bundle));
+  memcpy(r->R, pair.cam1_from_cam0_R, sizeof r->R);
+  memcpy(r->t, pair.cam1_from_cam0_t, sizeof r->t);
 }
 
 static void test_null_options_mean_initialised_ones(void) {

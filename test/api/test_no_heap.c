@@ -79,7 +79,7 @@ static void call_stages(void) {
   const tv_camera c = camera();
   tv_feature_options options;
   tv_two_view pose;
-  double R[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, t[3] = {1, 0, 0};
+  tv_camera_pair pair = {c, c, {1, 0, 0, 0, 1, 0, 0, 0, 1}, {1, 0, 0}};
   int32_t counts[2] = {0, 0}, num = 0, k, v;
   tv_feature_options_init(&options);
   options.max_keypoints = MOST;
@@ -111,11 +111,10 @@ static void call_stages(void) {
   TEST_ASSERT_EQUAL_INT(TV_OK, estimate_pixels(context.context, NULL, NULL, at[0], at[1], NULL, num,
                                                NULL, &pose, NULL));
   TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_triangulate(TV_TRIANGULATION_POLY, &c, &c, R, t, at[0], at[1], num, points));
+      TV_OK, triangulate_pixels(&pair, at[0], at[1], num, TV_TRIANGULATION_POLY, points));
   TEST_ASSERT_EQUAL_INT(
-      TV_OK, adjust_pixels(context.context, &c, &c, at[0], at[1], num, NULL, R, t, points, NULL));
-  TEST_ASSERT_EQUAL_INT(TV_OK,
-                        tv_point_covariances(&c, &c, R, t, NULL, 0.5, points, num, covariances));
+      TV_OK, adjust_pixels(context.context, at[0], at[1], num, NULL, &pair, points, NULL));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_point_covariances(&pair, points, num, 0.5, NULL, covariances));
 }
 
 static void call_reconstruct(void) {

@@ -730,24 +730,25 @@ static void test_a_frame_is_located_without_changing_the_map(void) {
   save(odometry, map, &num_map);
   room_flight(num_flown - 4, pixels);
   tv_odometry_state_init(&found);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_locate(odometry, &image, -1, &found));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_locate(odometry, &image, NULL, -1, &found));
   TEST_ASSERT_TRUE(found.has_pose);
   TEST_ASSERT_TRUE(found.has_pose && found.reference_id >= 0);
   expect_unchanged();
   memset(pixels, 0, sizeof pixels);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_locate(odometry, &image, 0, &found));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_locate(odometry, &image, NULL, 0, &found));
   TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_LOST, found.status);
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_locate(NULL, &image, 0, &found));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_locate(odometry, NULL, 0, &found));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_locate(odometry, &image, 0, NULL));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_locate(NULL, &image, NULL, 0, &found));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_locate(odometry, NULL, NULL, 0, &found));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_locate(odometry, &image, NULL, 0, NULL));
   image.data = (const uint8_t *)&found;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_odometry_locate(odometry, &image, 0, &found));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_odometry_locate(odometry, &image, NULL, 0, &found));
   image.data = pixels, image.width = 16;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_CAMERA, tv_odometry_locate(odometry, &image, 0, &found));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_CAMERA, tv_odometry_locate(odometry, &image, NULL, 0, &found));
   image = frame.image, image.stride_bytes = 1;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_STRIDE, tv_odometry_locate(odometry, &image, 0, &found));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_STRIDE, tv_odometry_locate(odometry, &image, NULL, 0, &found));
   found.struct_size = 1;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_STRUCT_SIZE, tv_odometry_locate(odometry, &frame.image, 0, &found));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_STRUCT_SIZE,
+                        tv_odometry_locate(odometry, &frame.image, NULL, 0, &found));
 }
 
 /* Neither before the map begins nor later. */
@@ -762,7 +763,7 @@ static void test_frames_go_on_as_if_none_had_been_located(void) {
   for (k = 0; k < num_flown; ++k) {
     TEST_ASSERT_EQUAL_INT(TV_OK, give(other, k));
     room_flight(k / 2, pixels);
-    TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_locate(other, &frame.image, -1, &found));
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_locate(other, &frame.image, NULL, -1, &found));
     TEST_ASSERT_EQUAL_INT(state.num_keyframes, found.num_keyframes);
     TEST_ASSERT_EQUAL_INT(state.num_frames, found.num_frames);
   }
@@ -811,28 +812,26 @@ static void test_a_located_frame_has_no_keypoint_where_the_mask_is_0(void) {
   room_flight(num_flown - 4, pixels);
   tv_odometry_state_init(&found);
   tv_odometry_state_init(&masked);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_locate(odometry, &image, -1, &found));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_locate(odometry, &image, NULL, -1, &found));
   TEST_ASSERT_TRUE(found.has_pose);
   make_mask(ROOM_WIDTH, &mask);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_locate_masked(odometry, &image, &mask, -1, &masked));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_locate(odometry, &image, &mask, -1, &masked));
   TEST_ASSERT_EQUAL_MEMORY(&found, &masked, sizeof found);
   mask.data = NULL, mask.width = 1; /* not read */
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_locate_masked(odometry, &image, &mask, -1, &masked));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_locate(odometry, &image, &mask, -1, &masked));
   TEST_ASSERT_EQUAL_MEMORY(&found, &masked, sizeof found);
   make_mask(2 * ROOM_WIDTH / 3, &mask);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_locate_masked(odometry, &image, &mask, -1, &masked));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_locate(odometry, &image, &mask, -1, &masked));
   TEST_ASSERT_TRUE(masked.has_pose);
   TEST_ASSERT_LESS_THAN_INT(found.num_inliers, masked.num_inliers);
   make_mask(0, &mask);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_locate_masked(odometry, &image, &mask, -1, &masked));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_locate(odometry, &image, &mask, -1, &masked));
   TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_LOST, masked.status);
   expect_unchanged();
   mask.width -= 1;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_MASK,
-                        tv_odometry_locate_masked(odometry, &image, &mask, -1, &masked));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_MASK, tv_odometry_locate(odometry, &image, &mask, -1, &masked));
   mask = image, mask.data = (const uint8_t *)&masked;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
-                        tv_odometry_locate_masked(odometry, &image, &mask, -1, &masked));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_odometry_locate(odometry, &image, &mask, -1, &masked));
 }
 
 static void test_a_mask_without_0_and_the_frame_of_an_older_header_change_nothing(void) {

@@ -421,17 +421,18 @@ static void test_sigmas_by_size_are_those_of_the_stages_by_hand(void) {
                                                       &o.estimate, &by_hand, mask));
     if (adjusted) {
       tv_bundle_result result;
-      tv_camera corrected;
+      tv_camera_pair corrected;
       tv_bundle_result_init(&result);
-      TEST_ASSERT_EQUAL_INT(TV_OK, tv_corrected_camera(&by_hand, &camera, &corrected));
+      TEST_ASSERT_EQUAL_INT(TV_OK, tv_corrected_pair(&by_hand, &camera, &camera, &corrected));
       TEST_ASSERT_EQUAL_INT(
-          TV_OK, tv_triangulate(TV_TRIANGULATION_ITERATIVE_LS, &corrected, &corrected, by_hand.R,
-                                by_hand.t, pixels[0], pixels[1], n, points));
+          TV_OK, tv_triangulate(&corrected, &pairs, TV_TRIANGULATION_ITERATIVE_LS, points));
       for (k = 0; k < n; ++k) {
         if (mask[k] == 0) points[k].status = TV_POINT_INVALID;
       }
-      TEST_ASSERT_EQUAL_INT(TV_OK, tv_adjust_two_view(c.context, &corrected, &corrected, &pairs,
-                                                      NULL, by_hand.R, by_hand.t, points, &result));
+      TEST_ASSERT_EQUAL_INT(
+          TV_OK, tv_adjust_two_view(c.context, &pairs, NULL, &corrected, points, &result));
+      memcpy(by_hand.R, corrected.cam1_from_cam0_R, sizeof by_hand.R);
+      memcpy(by_hand.t, corrected.cam1_from_cam0_t, sizeof by_hand.t);
       TEST_ASSERT_TRUE(by_hand.noise_px != two_view.noise_px);
       by_hand.noise_px = result.noise_px;
     }
@@ -490,8 +491,8 @@ static void test_aligned_matches_are_estimated_from_moved_keypoints(void) {
   }
   memcpy(again, plain, sizeof again);
   TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_align_matches(c.context, &views[0].image, &views[1].image, 4, again[0], num[0],
-                              again[1], num[1], reconstruction.matches, n, factors));
+      TV_OK, align_keypoints_of(c.context, views[0].image, views[1].image, reconstruction.matches,
+                                n, 4, again[0], num[0], again[1], num[1], factors));
   for (k = 0; k < n; ++k) {
     const int32_t i[2] = {reconstruction.matches[k].idx0, reconstruction.matches[k].idx1};
     int changed[2];

@@ -14,7 +14,7 @@ static float distance[PIXELS], sigma[PIXELS];
 static uint8_t witnesses[PIXELS], pixels[3 * PIXELS];
 static tv_depth_map map;
 static tv_camera camera;
-static double R[9], t[3];
+static double *const R = map.world_from_cam_R, *const t = map.world_from_cam_t;
 static tv_room *room;
 static tv_room_vertex vertices[MOST];
 static tv_room_triangle triangles[MOST];
@@ -33,9 +33,9 @@ void setUp(void) {
     witnesses[i] = 1;
     pixels[3 * i] = pixels[3 * i + 1] = pixels[3 * i + 2] = 77;
   }
-  for (i = 0; i < 9; ++i) R[i] = i % 4 == 0;
-  for (i = 0; i < 3; ++i) t[i] = 0;
   tv_depth_map_init(&map);
+  map.camera = &camera;
+  for (i = 0; i < 9; ++i) R[i] = i % 4 == 0;
   map.width = map.stride = WIDTH, map.height = HEIGHT;
   map.distance = distance, map.sigma = sigma, map.witnesses = witnesses;
   map.pixels = pixels, map.channels = 3, map.pixel_stride_bytes = 3 * WIDTH;
@@ -43,15 +43,15 @@ void setUp(void) {
   memory = block + API_GUARD_BYTES;
   memory += TV_CONTEXT_ALIGNMENT - (uintptr_t)memory % TV_CONTEXT_ALIGNMENT;
   room = NULL;
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_room_init(NULL, memory, ROOM, &room));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_room_init(&room, NULL, memory, ROOM));
 }
 
 void tearDown(void) {}
 
-static tv_status add(void) { return tv_room_add(room, &camera, R, t, &map); }
+static tv_status add(void) { return tv_room_add(room, &map); }
 
 static tv_status mesh(const tv_room_mesh_options *options) {
-  return tv_room_mesh(room, options, vertices, MOST, triangles, MOST, &num_vertices,
+  return tv_room_mesh(room, options, vertices, MOST, &num_vertices, triangles, MOST,
                       &num_triangles);
 }
 
@@ -65,9 +65,9 @@ static void expect_maps(int32_t expected) {
 /* That a map is refused with this status, and that it is by the functions that take equal
    arguments, too. */
 static void expect_refusal(tv_status expected) {
-  TEST_ASSERT_EQUAL_INT(expected, tv_room_add(room, &camera, R, t, &map));
-  TEST_ASSERT_EQUAL_INT(expected, tv_room_remove(room, &camera, R, t, &map));
-  TEST_ASSERT_EQUAL_INT(expected, tv_room_see_through(room, &camera, R, t, &map));
+  TEST_ASSERT_EQUAL_INT(expected, tv_room_add(room, &map));
+  TEST_ASSERT_EQUAL_INT(expected, tv_room_remove(room, &map));
+  TEST_ASSERT_EQUAL_INT(expected, tv_room_see_through(room, &map));
   expect_maps(0);
   setUp();
 }
@@ -89,6 +89,7 @@ static void test_defaults_are_those_of_the_header(void) {
   TEST_ASSERT_EQUAL_DOUBLE(0.02, of_planes.gravity_sigma_rad);
   tv_room_infer_options_init(&of_infer);
   TEST_ASSERT_EQUAL_INT(3, of_infer.max_step);
+  TEST_ASSERT_TRUE(of_infer.planes == NULL && of_infer.num_planes == 0);
   tv_room_options_init(NULL);
   tv_depth_map_init(NULL);
   tv_room_state_init(NULL);
@@ -101,25 +102,25 @@ static void test_init_refuses(void) {
   tv_room_options o;
   tv_room *made = NULL;
   tv_room_options_init(&o);
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_room_init(&o, NULL, ROOM, &made));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_room_init(&o, memory, ROOM, NULL));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_ALIGNMENT, tv_room_init(&o, memory + 8, ROOM, &made));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_MEMORY, tv_room_init(&o, memory, TV_ROOM_MIN_BYTES - 1, &made));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_room_init(&made, &o, NULL, ROOM));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_room_init(NULL, &o, memory, ROOM));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ALIGNMENT, tv_room_init(&made, &o, memory + 8, ROOM));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_MEMORY, tv_room_init(&made, &o, memory, TV_ROOM_MIN_BYTES - 1));
   o.struct_size = 3;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_STRUCT_SIZE, tv_room_init(&o, memory, ROOM, &made));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_STRUCT_SIZE, tv_room_init(&made, &o, memory, ROOM));
   tv_room_options_init(&o);
   o.voxel = NAN;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NOT_FINITE, tv_room_init(&o, memory, ROOM, &made));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NOT_FINITE, tv_room_init(&made, &o, memory, ROOM));
   o.voxel = 0;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_room_init(&o, memory, ROOM, &made));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_room_init(&made, &o, memory, ROOM));
   tv_room_options_init(&o);
   o.truncation_voxels = 1;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_room_init(&o, memory, ROOM, &made));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_room_init(&made, &o, memory, ROOM));
   o.truncation_voxels = 9;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_room_init(&o, memory, ROOM, &made));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_room_init(&made, &o, memory, ROOM));
   tv_room_options_init(&o);
   o.max_distance = -1;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_room_init(&o, memory, ROOM, &made));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_room_init(&made, &o, memory, ROOM));
   TEST_ASSERT_NULL(made);
 }
 
@@ -130,7 +131,7 @@ static void test_a_room_stays_within_its_memory(void) {
     tv_room_state state;
     tv_status status;
     memset(block, API_PATTERN, sizeof block);
-    TEST_ASSERT_EQUAL_INT(TV_OK, tv_room_init(NULL, memory, sizes[k], &room));
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_room_init(&room, NULL, memory, sizes[k]));
     tv_room_state_init(&state);
     TEST_ASSERT_EQUAL_INT(TV_OK, tv_room_get_state(room, &state));
     TEST_ASSERT_TRUE(state.cap_blocks > (int32_t)(sizes[k] / 1400) - 90);
@@ -150,11 +151,10 @@ static void test_a_room_stays_within_its_memory(void) {
 }
 
 static void test_a_map_is_refused(void) {
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_room_add(NULL, &camera, R, t, &map));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_room_add(room, NULL, R, t, &map));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_room_add(room, &camera, NULL, t, &map));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_room_add(room, &camera, R, NULL, &map));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_room_add(room, &camera, R, t, NULL));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_room_add(NULL, &map));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_room_add(room, NULL));
+  map.camera = NULL;
+  expect_refusal(TV_ERR_NULL);
   map.distance = NULL;
   expect_refusal(TV_ERR_NULL);
   map.struct_size = 2;
@@ -194,22 +194,22 @@ static void test_a_map_is_refused(void) {
 }
 
 static void test_what_is_not_in_the_room_is_not_removed(void) {
-  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_room_remove(room, &camera, R, t, &map));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_room_remove(room, &map));
   TEST_ASSERT_EQUAL_INT(TV_OK, add());
   TEST_ASSERT_EQUAL_INT(TV_OK, add());
   expect_maps(2);
   t[0] = 0.01;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_room_remove(room, &camera, R, t, &map));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_room_remove(room, &map));
   t[0] = 0;
   pixels[5] = 3;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_room_remove(room, &camera, R, t, &map));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_room_remove(room, &map));
   pixels[5] = 77;
   map.inferred = 1;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_room_remove(room, &camera, R, t, &map));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_room_remove(room, &map));
   map.inferred = 0;
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_room_remove(room, &camera, R, t, &map));
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_room_remove(room, &camera, R, t, &map));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_room_remove(room, &camera, R, t, &map));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_room_remove(room, &map));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_room_remove(room, &map));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_room_remove(room, &map));
   expect_maps(0);
   TEST_ASSERT_EQUAL_INT(TV_OK, mesh(NULL));
   TEST_ASSERT_EQUAL_INT(0, num_vertices);
@@ -234,7 +234,7 @@ static void test_a_room_holds_its_limit_of_maps(void) {
     TEST_ASSERT_EQUAL_UINT8(77, vertices[k].rgb[1]);
   }
   for (k = 0; k < TV_ROOM_MAX_MAPS; ++k) {
-    TEST_ASSERT_EQUAL_INT(TV_OK, tv_room_remove(room, &camera, R, t, &map));
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_room_remove(room, &map));
   }
   TEST_ASSERT_EQUAL_INT(TV_OK, mesh(NULL));
   TEST_ASSERT_EQUAL_INT(0, num_vertices);
@@ -247,7 +247,7 @@ static void test_a_room_is_coarsened_sixteen_times(void) {
   for (k = 0; k < 16; ++k) TEST_ASSERT_EQUAL_INT(TV_OK, tv_room_coarsen(room));
   TEST_ASSERT_EQUAL_INT(TV_ERR_LIMITS, tv_room_coarsen(room));
   expect_maps(1);
-  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_room_remove(room, &camera, R, t, &map));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_room_remove(room, &map));
 }
 
 static void test_a_state_is_written_as_far_as_its_size(void) {
@@ -283,17 +283,17 @@ static void test_a_mesh_is_refused(void) {
   tv_room_mesh_options o;
   int32_t n;
   TEST_ASSERT_EQUAL_INT(TV_OK, add());
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_room_mesh(NULL, NULL, NULL, 0, NULL, 0, &n, &n));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_room_mesh(room, NULL, NULL, 1, NULL, 0, &n, &n));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_room_mesh(room, NULL, NULL, 0, NULL, 1, &n, &n));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_room_mesh(room, NULL, NULL, 0, NULL, 0, NULL, &n));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_room_mesh(room, NULL, NULL, 0, NULL, 0, &n, NULL));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_room_mesh(room, NULL, NULL, 0, NULL, 0, &n, &n));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_room_mesh(NULL, NULL, NULL, 0, &n, NULL, 0, &n));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_room_mesh(room, NULL, NULL, 1, &n, NULL, 0, &n));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_room_mesh(room, NULL, NULL, 0, &n, NULL, 1, &n));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_room_mesh(room, NULL, NULL, 0, NULL, NULL, 0, &n));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_room_mesh(room, NULL, NULL, 0, &n, NULL, 0, NULL));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_room_mesh(room, NULL, NULL, 0, &n, NULL, 0, &n));
   TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
-                        tv_room_mesh(room, NULL, (tv_room_vertex *)(void *)memory, MOST, triangles,
-                                     MOST, &num_vertices, &num_triangles));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_room_mesh(room, NULL, vertices, -1, triangles, MOST,
-                                                      &num_vertices, &num_triangles));
+                        tv_room_mesh(room, NULL, (tv_room_vertex *)(void *)memory, MOST,
+                                     &num_vertices, triangles, MOST, &num_triangles));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_room_mesh(room, NULL, vertices, -1, &num_vertices,
+                                                      triangles, MOST, &num_triangles));
   tv_room_mesh_options_init(&o);
   o.struct_size = 1;
   expect_mesh_refusal(TV_ERR_STRUCT_SIZE, &o);
@@ -356,19 +356,19 @@ static void test_shorter_mesh_options_mean_no_planes(void) {
 static void test_a_mesh_says_how_much_room_it_needs(void) {
   int32_t most_vertices, most_triangles;
   TEST_ASSERT_EQUAL_INT(TV_OK,
-                        tv_room_mesh(room, NULL, NULL, 0, NULL, 0, &num_vertices, &num_triangles));
+                        tv_room_mesh(room, NULL, NULL, 0, &num_vertices, NULL, 0, &num_triangles));
   TEST_ASSERT_EQUAL_INT(0, num_vertices);
   TEST_ASSERT_EQUAL_INT(TV_OK, add());
   TEST_ASSERT_EQUAL_INT(TV_ERR_CAPACITY,
-                        tv_room_mesh(room, NULL, NULL, 0, NULL, 0, &num_vertices, &num_triangles));
+                        tv_room_mesh(room, NULL, NULL, 0, &num_vertices, NULL, 0, &num_triangles));
   most_vertices = num_vertices, most_triangles = num_triangles;
   TEST_ASSERT_TRUE(most_vertices > 2000 && most_vertices < MOST);
   TEST_ASSERT_EQUAL_INT(TV_ERR_CAPACITY,
-                        tv_room_mesh(room, NULL, vertices, most_vertices - 1, triangles,
-                                     most_triangles, &num_vertices, &num_triangles));
+                        tv_room_mesh(room, NULL, vertices, most_vertices - 1, &num_vertices,
+                                     triangles, most_triangles, &num_triangles));
   memset(vertices, API_PATTERN, sizeof vertices);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_room_mesh(room, NULL, vertices, most_vertices, triangles,
-                                            most_triangles, &num_vertices, &num_triangles));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_room_mesh(room, NULL, vertices, most_vertices, &num_vertices,
+                                            triangles, most_triangles, &num_triangles));
   TEST_ASSERT_TRUE(num_vertices <= most_vertices && num_triangles <= most_triangles);
   TEST_ASSERT_EQUAL_UINT8(API_PATTERN, *(const uint8_t *)&vertices[most_vertices]);
 }
@@ -453,9 +453,9 @@ static void test_inference_is_refused_and_fills_the_wall(void) {
   TEST_ASSERT_EQUAL_INT(1, num);
   tv_room_infer_options_init(&o);
   num = -7;
-#define INFER(room_, map_, planes_, count_, memory_, bytes_, out_, num_)                           \
-  tv_room_infer(room_, &camera, R, t, map_, planes_, count_, &o, memory_, bytes_, out_, out_sigma, \
-                num_)
+#define INFER(room_, map_, planes_, count_, memory_, bytes_, out_, num_) \
+  (o.planes = (planes_), o.num_planes = (count_),                        \
+   tv_room_infer(room_, memory_, bytes_, map_, &o, out_, out_sigma, num_))
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, INFER(NULL, &map, &plane, 1, aligned, bytes, out, &num));
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, INFER(room, NULL, &plane, 1, aligned, bytes, out, &num));
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, INFER(room, &map, NULL, 1, aligned, bytes, out, &num));
@@ -478,6 +478,8 @@ static void test_inference_is_refused_and_fills_the_wall(void) {
   TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, INFER(room, &map, &plane, 1, aligned, bytes, out, &num));
   map.pixels = pixels, o.max_step = 256;
   TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, INFER(room, &map, &plane, 1, aligned, bytes, out, &num));
+  o.max_step = 3, o.reserved = 1;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, INFER(room, &map, &plane, 1, aligned, bytes, out, &num));
   tv_room_infer_options_init(&o);
   plane.sigma = NAN;
   TEST_ASSERT_EQUAL_INT(TV_ERR_NOT_FINITE, INFER(room, &map, &plane, 1, aligned, bytes, out, &num));
@@ -493,6 +495,10 @@ static void test_inference_is_refused_and_fills_the_wall(void) {
     }
   }
   TEST_ASSERT_EQUAL_INT(TV_OK, INFER(room, &map, NULL, 0, aligned, bytes, out, &num));
+  TEST_ASSERT_EQUAL_INT(0, num);
+  num = -7;
+  TEST_ASSERT_EQUAL_INT(TV_OK,
+                        tv_room_infer(room, aligned, bytes, &map, NULL, out, out_sigma, &num));
   TEST_ASSERT_EQUAL_INT(0, num);
 }
 

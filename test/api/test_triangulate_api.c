@@ -2,7 +2,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "twoview/twoview.h"
+#include "support/calls.h"
 #include "unity.h"
 
 #define NUM_POINTS 4
@@ -15,6 +15,9 @@ static tv_point points[NUM_POINTS + 1], untouched[NUM_POINTS + 1];
 /* Four points at depths of 2 to 5, with a baseline of 1. */
 static const double truth[NUM_POINTS][3] = {
     {0.1, 0.2, 2}, {-0.3, 0.1, 3}, {0.5, -0.4, 4}, {1, 0.5, 5}};
+
+static double corrected0[2 * NUM_POINTS], corrected1[2 * NUM_POINTS];
+static uint8_t valid[NUM_POINTS];
 
 void setUp(void) {
   int i;
@@ -40,7 +43,8 @@ void setUp(void) {
 void tearDown(void) {}
 
 static tv_status run(tv_triangulation method) {
-  return tv_triangulate(method, &camera0, &camera1, R, t, pixels0, pixels1, NUM_POINTS, points);
+  const tv_camera_pair pair = pair_of(&camera0, &camera1, R, t);
+  return triangulate_pixels(&pair, pixels0, pixels1, NUM_POINTS, method, points);
 }
 
 static void expect_refusal(tv_status expected) {
@@ -73,29 +77,39 @@ static void test_other_methods_are_refused(void) {
 
 static void test_null_pointers_are_refused(void) {
   const tv_triangulation m = TV_TRIANGULATION_MIDPOINT;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
-                        tv_triangulate(m, NULL, &camera1, R, t, pixels0, pixels1, 4, points));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
-                        tv_triangulate(m, &camera0, NULL, R, t, pixels0, pixels1, 4, points));
-  TEST_ASSERT_EQUAL_INT(
-      TV_ERR_NULL, tv_triangulate(m, &camera0, &camera1, NULL, t, pixels0, pixels1, 4, points));
-  TEST_ASSERT_EQUAL_INT(
-      TV_ERR_NULL, tv_triangulate(m, &camera0, &camera1, R, NULL, pixels0, pixels1, 4, points));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
-                        tv_triangulate(m, &camera0, &camera1, R, t, NULL, pixels1, 4, points));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
-                        tv_triangulate(m, &camera0, &camera1, R, t, pixels0, NULL, 4, points));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
-                        tv_triangulate(m, &camera0, &camera1, R, t, pixels0, pixels1, 4, NULL));
+  const tv_camera_pair pair = pair_of(&camera0, &camera1, R, t);
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, triangulate_pixels(NULL, pixels0, pixels1, 4, m, points));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_triangulate(&pair, NULL, m, points));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, triangulate_pixels(&pair, NULL, pixels1, 4, m, points));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, triangulate_pixels(&pair, pixels0, NULL, 4, m, points));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, triangulate_pixels(&pair, pixels0, pixels1, 4, m, NULL));
   TEST_ASSERT_EQUAL_MEMORY(untouched, points, sizeof points);
 }
 
 static void test_no_points_are_fine_and_fewer_are_not(void) {
   const tv_triangulation m = TV_TRIANGULATION_MIDPOINT;
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_triangulate(m, &camera0, &camera1, R, t, NULL, NULL, 0, NULL));
+  const tv_camera_pair pair = pair_of(&camera0, &camera1, R, t);
+  TEST_ASSERT_EQUAL_INT(TV_OK, triangulate_pixels(&pair, NULL, NULL, 0, m, NULL));
   TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT,
-                        tv_triangulate(m, &camera0, &camera1, R, t, pixels0, pixels1, -1, points));
+                        triangulate_pixels(&pair, pixels0, pixels1, -1, m, points));
   TEST_ASSERT_EQUAL_MEMORY(untouched, points, sizeof points);
+}
+
+static void test_pairs_of_another_size_are_refused_and_sigmas_are_not_read(void) {
+  const float bad[NUM_POINTS] = {-1};
+  const tv_camera_pair pair = pair_of(&camera0, &camera1, R, t);
+  tv_pixel_pairs pairs = pairs_of(pixels0, pixels1, NULL, NUM_POINTS);
+  pairs.struct_size = 2;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_STRUCT_SIZE,
+                        tv_triangulate(&pair, &pairs, TV_TRIANGULATION_POLY, points));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_STRUCT_SIZE, tv_correct_matches(&pair, &pairs, TV_TRIANGULATION_POLY,
+                                                               corrected0, corrected1, valid));
+  TEST_ASSERT_EQUAL_MEMORY(untouched, points, sizeof points);
+  pairs.struct_size = sizeof pairs;
+  pairs.sigmas0 = pairs.sigmas1 = pairs.ratios = bad;
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_triangulate(&pair, &pairs, TV_TRIANGULATION_POLY, points));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_correct_matches(&pair, &pairs, TV_TRIANGULATION_POLY, corrected0,
+                                                  corrected1, valid));
 }
 
 static void test_r_is_a_rotation_to_a_millionth(void) {
@@ -146,6 +160,7 @@ static void test_a_bad_pixel_spoils_its_point_only(void) {
 
 static void test_points_may_not_lie_over_pixels(void) {
   const tv_triangulation m = TV_TRIANGULATION_MIDPOINT;
+  tv_camera_pair pair = pair_of(&camera0, &camera1, R, t);
   union {
     tv_point points[NUM_POINTS];
     double pixels[2 * NUM_POINTS];
@@ -153,19 +168,19 @@ static void test_points_may_not_lie_over_pixels(void) {
   memcpy(both.pixels, pixels0, sizeof both.pixels);
   memset((char *)&both + sizeof both.pixels, 0, sizeof both - sizeof both.pixels);
   before = both;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_triangulate(m, &camera0, &camera1, R, t, both.pixels,
-                                                       pixels1, NUM_POINTS, both.points));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_triangulate(m, &camera0, &camera1, R, t, pixels1,
-                                                       both.pixels, NUM_POINTS, both.points));
+  TEST_ASSERT_EQUAL_INT(
+      TV_ERR_OVERLAP, triangulate_pixels(&pair, both.pixels, pixels1, NUM_POINTS, m, both.points));
+  TEST_ASSERT_EQUAL_INT(
+      TV_ERR_OVERLAP, triangulate_pixels(&pair, pixels1, both.pixels, NUM_POINTS, m, both.points));
+  TEST_ASSERT_EQUAL_INT(
+      TV_ERR_OVERLAP, triangulate_pixels(&pair, pixels0, pixels1, 1, m, (tv_point *)(void *)&pair));
   TEST_ASSERT_EQUAL_MEMORY(&before, &both, sizeof both);
 }
 
-static double corrected0[2 * NUM_POINTS], corrected1[2 * NUM_POINTS];
-static uint8_t valid[NUM_POINTS];
-
 static tv_status correct(tv_triangulation cost) {
-  return tv_correct_matches(cost, &camera0, &camera1, R, t, pixels0, pixels1, NUM_POINTS,
-                            corrected0, corrected1, valid);
+  const tv_camera_pair pair = pair_of(&camera0, &camera1, R, t);
+  return correct_pixels_of(&pair, pixels0, pixels1, NUM_POINTS, cost, corrected0, corrected1,
+                           valid);
 }
 
 static void test_corrected_matches_meet_at_the_points_of_the_same_method(void) {
@@ -205,41 +220,31 @@ static void test_a_match_that_cannot_be_corrected_is_zeros(void) {
 static void test_bad_arguments_of_a_correction_are_refused(void) {
   const tv_triangulation poly = TV_TRIANGULATION_POLY;
   double *const a = corrected0, *const b = corrected1;
+  tv_camera_pair pair = pair_of(&camera0, &camera1, R, t);
+  const tv_camera_pair *const c = &pair;
   int m;
   for (m = 2; m < 8; ++m) {
     TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, correct((tv_triangulation)m));
   }
-#define CORRECT(c0, c1, r, tr, p0, p1, n, q0, q1, v) \
-  tv_correct_matches(poly, c0, c1, r, tr, p0, p1, n, q0, q1, v)
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
-                        CORRECT(NULL, &camera1, R, t, pixels0, pixels1, NUM_POINTS, a, b, valid));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
-                        CORRECT(&camera0, NULL, R, t, pixels0, pixels1, NUM_POINTS, a, b, valid));
-  TEST_ASSERT_EQUAL_INT(
-      TV_ERR_NULL, CORRECT(&camera0, &camera1, NULL, t, pixels0, pixels1, NUM_POINTS, a, b, valid));
-  TEST_ASSERT_EQUAL_INT(
-      TV_ERR_NULL, CORRECT(&camera0, &camera1, R, NULL, pixels0, pixels1, NUM_POINTS, a, b, valid));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
-                        CORRECT(&camera0, &camera1, R, t, NULL, pixels1, NUM_POINTS, a, b, valid));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
-                        CORRECT(&camera0, &camera1, R, t, pixels0, NULL, NUM_POINTS, a, b, valid));
-  TEST_ASSERT_EQUAL_INT(
-      TV_ERR_NULL, CORRECT(&camera0, &camera1, R, t, pixels0, pixels1, NUM_POINTS, NULL, b, valid));
-  TEST_ASSERT_EQUAL_INT(
-      TV_ERR_NULL, CORRECT(&camera0, &camera1, R, t, pixels0, pixels1, NUM_POINTS, a, NULL, valid));
-  TEST_ASSERT_EQUAL_INT(
-      TV_ERR_NULL, CORRECT(&camera0, &camera1, R, t, pixels0, pixels1, NUM_POINTS, a, b, NULL));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT,
-                        CORRECT(&camera0, &camera1, R, t, pixels0, pixels1, -1, a, b, valid));
-  TEST_ASSERT_EQUAL_INT(TV_OK, CORRECT(&camera0, &camera1, R, t, NULL, NULL, 0, NULL, NULL, NULL));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, CORRECT(&camera0, &camera1, R, t, pixels0, pixels1,
-                                                NUM_POINTS, pixels0, b, valid));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, CORRECT(&camera0, &camera1, R, t, pixels0, pixels1,
-                                                NUM_POINTS, a, pixels0, valid));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, CORRECT(&camera0, &camera1, R, t, pixels0, pixels1,
-                                                NUM_POINTS, a, a + 2, valid));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, CORRECT(&camera0, &camera1, R, t, pixels0, pixels1,
-                                                NUM_POINTS, a, b, (uint8_t *)b + 9));
+#define CORRECT(c, p0, p1, n, q0, q1, v) correct_pixels_of(c, p0, p1, n, poly, q0, q1, v)
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, CORRECT(NULL, pixels0, pixels1, NUM_POINTS, a, b, valid));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_correct_matches(c, NULL, poly, a, b, valid));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, CORRECT(c, NULL, pixels1, NUM_POINTS, a, b, valid));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, CORRECT(c, pixels0, NULL, NUM_POINTS, a, b, valid));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, CORRECT(c, pixels0, pixels1, NUM_POINTS, NULL, b, valid));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, CORRECT(c, pixels0, pixels1, NUM_POINTS, a, NULL, valid));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, CORRECT(c, pixels0, pixels1, NUM_POINTS, a, b, NULL));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, CORRECT(c, pixels0, pixels1, -1, a, b, valid));
+  TEST_ASSERT_EQUAL_INT(TV_OK, CORRECT(c, NULL, NULL, 0, NULL, NULL, NULL));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
+                        CORRECT(c, pixels0, pixels1, NUM_POINTS, pixels0, b, valid));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
+                        CORRECT(c, pixels0, pixels1, NUM_POINTS, a, pixels0, valid));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, CORRECT(c, pixels0, pixels1, NUM_POINTS, a, a + 2, valid));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
+                        CORRECT(c, pixels0, pixels1, NUM_POINTS, a, b, (uint8_t *)b + 9));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
+                        CORRECT(c, pixels0, pixels1, 1, a, b, (uint8_t *)&pair + 5));
 #undef CORRECT
   R[0] = NAN;
   TEST_ASSERT_EQUAL_INT(TV_ERR_NOT_FINITE, correct(poly));
@@ -257,6 +262,7 @@ int main(void) {
   RUN_TEST(test_other_methods_are_refused);
   RUN_TEST(test_null_pointers_are_refused);
   RUN_TEST(test_no_points_are_fine_and_fewer_are_not);
+  RUN_TEST(test_pairs_of_another_size_are_refused_and_sigmas_are_not_read);
   RUN_TEST(test_r_is_a_rotation_to_a_millionth);
   RUN_TEST(test_t_is_not_zero);
   RUN_TEST(test_numbers_that_are_not_finite_are_refused);

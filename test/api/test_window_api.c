@@ -30,7 +30,7 @@ static uint8_t *memory;
 static size_t size_bytes;
 
 static tv_status run(void) {
-  return tv_adjust_window(&window, &options, memory, size_bytes, out.covariances, out.errors,
+  return tv_adjust_window(memory, size_bytes, &window, &options, out.covariances, out.errors,
                           &out.result);
 }
 
@@ -132,7 +132,7 @@ static void test_outputs_are_optional(void) {
   first = out;
   out = before;
   TEST_ASSERT_EQUAL_INT(TV_OK,
-                        tv_adjust_window(&window, NULL, memory, size_bytes, NULL, NULL, NULL));
+                        tv_adjust_window(memory, size_bytes, &window, NULL, NULL, NULL, NULL));
   TEST_ASSERT_EQUAL_MEMORY(first.views, out.views, sizeof out.views);
   TEST_ASSERT_EQUAL_MEMORY(first.points, out.points, sizeof out.points);
   TEST_ASSERT_EQUAL_MEMORY(before.covariances, out.covariances, sizeof out.covariances);
@@ -149,8 +149,8 @@ static void test_no_iteration_only_measures(void) {
 
 static void test_null_pointers_are_refused(void) {
   const tv_window whole = window;
-  expect_refused(TV_ERR_NULL, tv_adjust_window(NULL, NULL, memory, size_bytes, NULL, NULL, NULL));
-  expect_refused(TV_ERR_NULL, tv_adjust_window(&window, NULL, NULL, size_bytes, NULL, NULL, NULL));
+  expect_refused(TV_ERR_NULL, tv_adjust_window(memory, size_bytes, NULL, NULL, NULL, NULL, NULL));
+  expect_refused(TV_ERR_NULL, tv_adjust_window(NULL, size_bytes, &window, NULL, NULL, NULL, NULL));
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_adjust_window_size(NULL, &size_bytes));
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_adjust_window_size(&window, NULL));
   window.cameras = NULL, expect_refused(TV_ERR_NULL, run()), window = whole;
@@ -278,14 +278,14 @@ static void test_structs_of_other_releases(void) {
   } newer_result;
   tv_window_options_init_sized(&newer.known, sizeof newer);
   tv_window_result_init_sized(&newer_result.known, sizeof newer_result);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_adjust_window(&window, &newer.known, memory, size_bytes, NULL,
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_adjust_window(memory, size_bytes, &window, &newer.known, NULL,
                                                 NULL, &newer_result.known));
   TEST_ASSERT_EQUAL_UINT32(sizeof newer_result, newer_result.known.struct_size);
   TEST_ASSERT_TRUE(newer_result.known.final_cost > 0);
   out = before;
   newer.more[3] = 1;
   expect_refused(TV_ERR_STRUCT_SIZE,
-                 tv_adjust_window(&window, &newer.known, memory, size_bytes, NULL, NULL, NULL));
+                 tv_adjust_window(memory, size_bytes, &window, &newer.known, NULL, NULL, NULL));
   window.struct_size = 3;
   expect_refused(TV_ERR_STRUCT_SIZE, run());
   TEST_ASSERT_EQUAL_INT(TV_ERR_STRUCT_SIZE, tv_adjust_window_size(&window, &size_bytes));
@@ -295,11 +295,11 @@ static void test_structs_of_other_releases(void) {
 }
 
 static void test_overlapping_outputs_are_refused(void) {
-  expect_refused(TV_ERR_OVERLAP, tv_adjust_window(&window, &options, memory, size_bytes,
+  expect_refused(TV_ERR_OVERLAP, tv_adjust_window(memory, size_bytes, &window, &options,
                                                   (double *)(void *)memory, NULL, &out.result));
-  expect_refused(TV_ERR_OVERLAP, tv_adjust_window(&window, &options, memory, size_bytes, out.points,
+  expect_refused(TV_ERR_OVERLAP, tv_adjust_window(memory, size_bytes, &window, &options, out.points,
                                                   NULL, &out.result));
-  expect_refused(TV_ERR_OVERLAP, tv_adjust_window(&window, &options, memory, size_bytes, NULL,
+  expect_refused(TV_ERR_OVERLAP, tv_adjust_window(memory, size_bytes, &window, &options, NULL,
                                                   (float *)(void *)observations, &out.result));
 }
 

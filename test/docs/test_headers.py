@@ -10,6 +10,9 @@
 - A floating-point field has its unit in its name or comment.
 - A header of an algorithm or of a protocol names its source: the page under docs/ that has papers,
   formulas and tests.
+
+A function has at most eight parameters, in the order of docs/conventions.md: what belongs together
+is a struct.
 """
 
 import pathlib
@@ -18,6 +21,7 @@ import unittest
 
 from twoview_tools.docs import headers
 
+MOST_PARAMETERS = 8
 STATUS = re.compile(r"\bTVS?_(?:OK|NONE|END|ERR_\w+)\b|\b(?:Returns|Statuses) (?:also |as )")
 UNIT_NAME = re.compile(
     r"_(?:px|rad|deg|mdeg|ns|ms|s|us|m|mm|cm|pa|mg|mv|dc|kb|percent|celsius|bytes|sq|sigma|hz)\b"
@@ -118,6 +122,20 @@ class TestHeaders(unittest.TestCase):
                 for name in unnamed_parameters(function, self.functions)
             ],
             "pointers that the function's comment does not name",
+        )
+
+    def test_a_function_has_at_most_eight_parameters(self):
+        counted = [
+            (path, function, len(list(headers.parameters(function))))
+            for path, function in self.each("function")
+        ]
+        self.report(
+            [
+                (path, function, f"{function.name}: {count}")
+                for path, function, count in counted
+                if count > MOST_PARAMETERS
+            ],
+            f"functions of more than {MOST_PARAMETERS} parameters",
         )
 
     def test_every_status_is_said(self):

@@ -107,22 +107,23 @@ void require_sound(const tv_dense_point& point, const tv_image& image0, const tv
 
 int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   fuzz::Bytes bytes(data, size);
-  const tv_dense_options options = options_of(bytes);
+  tv_dense_options options = options_of(bytes);
   const Picture picture0 = picture_of(bytes, 0), picture1 = picture_of(bytes, bytes.whole(0, 15));
   const tv_image image0 = picture0.image(), image1 = picture1.image();
   const tv_camera camera0 = camera_of(bytes, image0.width, image0.height);
   const tv_camera camera1 = camera_of(bytes, image1.width, image1.height);
-  double R[9], t[3] = {-1, 0, 0};
-  any_rotation(bytes, R);
+  tv_camera_pair pair{camera0, camera1, {}, {-1, 0, 0}};
+  any_rotation(bytes, pair.cam1_from_cam0_R);
   if (bytes.whole(0, 2) == 0)
-    for (double& value : t) value = bytes.wild(-1, 1);
+    for (double& value : pair.cam1_from_cam0_t) value = bytes.wild(-1, 1);
   tv_point sparse[kNumSparse];
   std::memset(sparse, 0, sizeof sparse);
   for (tv_point& point : sparse) {
     point.status = bytes.whole(0, 3) == 0 ? bytes.whole(0, 5) : TV_POINT_OK;
     point.angle_rad = bytes.wild(0, 0.5);
   }
-  const int num_sparse = bytes.whole(0, kNumSparse);
+  options.sparse = sparse;
+  options.num_sparse = bytes.whole(0, kNumSparse);
   const int cap = bytes.whole(0, 3) == 0 ? bytes.whole(0, 40) : kMaxPoints;
   if (options.max_cells > 100000) return 0;  // it may be valid, and asks for minutes and gigabytes
   size_t need = 0;
@@ -135,8 +136,8 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     std::memset(memory, 255 * k, need);
     points[k].resize(static_cast<size_t>(cap));
     int32_t count = -1;
-    status[k] = tv_densify(&image0, &image1, &camera0, &camera1, R, t, sparse, num_sparse, &options,
-                           memory, need, points[k].data(), cap, &count);
+    const tv_image images[2] = {image0, image1};
+    status[k] = tv_densify(memory, need, &pair, images, &options, points[k].data(), cap, &count);
     std::free(memory);
     if (status[k] != TV_OK) count = 0;
     FUZZ_REQUIRE(count >= 0 && count <= cap);

@@ -80,7 +80,7 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     grey[k].resize(count);
     const tv_depth_arrays arrays = {distance[k].data(), sigma[k].data(), witnesses[k].data(),
                                     grey[k].data()};
-    status[k] = tv_sweep_depth(views, num_views, &options, memory, need, &arrays);
+    status[k] = tv_sweep_depth(memory, need, views, num_views, &options, &arrays);
     std::free(memory);
   }
   FUZZ_REQUIRE(status[0] == status[1]);

@@ -91,8 +91,8 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     FUZZ_REQUIRE(i == 0 || matches[i].idx0 > matches[i - 1].idx0);
   }
   uint8_t aligned[kMaxKeypoints];
-  FUZZ_REQUIRE(tv_align_matches(context, &images[0], &images[1], options.keypoint_size,
-                                keypoints_of[0], counts[0], keypoints_of[1], counts[1], matches,
-                                count, aligned) == TV_OK);
+  tv_keypoint* const moved[2] = {keypoints_of[0], keypoints_of[1]};
+  FUZZ_REQUIRE(tv_align_matches(context, images, matches, count, options.keypoint_size, moved,
+                                counts, aligned) == TV_OK);
   return 0;
 }

@@ -22,6 +22,15 @@ struct Map {
   tv_depth_map map;
 };
 
+// The map as the library is given it.
+tv_depth_map given(const Map& m) {
+  tv_depth_map map = m.map;
+  map.camera = &m.camera;
+  std::copy(m.R, m.R + 9, map.world_from_cam_R);
+  std::copy(m.t, m.t + 3, map.world_from_cam_t);
+  return map;
+}
+
 Map map_of(fuzz::Bytes& bytes) {
   Map m;
   m.camera = {TV_CAMERA_PINHOLE, 0, 0, 0, 20, 20, 11.5, 11.5, {}};
@@ -77,12 +86,12 @@ Mesh mesh_of(tv_room* room, const tv_room_mesh_options* options) {
   Mesh mesh;
   int32_t num_vertices = 0, num_triangles = 0;
   tv_status status =
-      tv_room_mesh(room, options, nullptr, 0, nullptr, 0, &num_vertices, &num_triangles);
+      tv_room_mesh(room, options, nullptr, 0, &num_vertices, nullptr, 0, &num_triangles);
   if (status != TV_ERR_CAPACITY) return mesh;
   mesh.vertices.resize(static_cast<size_t>(num_vertices));
   mesh.triangles.resize(static_cast<size_t>(num_triangles));
-  status = tv_room_mesh(room, options, mesh.vertices.data(), num_vertices, mesh.triangles.data(),
-                        num_triangles, &num_vertices, &num_triangles);
+  status = tv_room_mesh(room, options, mesh.vertices.data(), num_vertices, &num_vertices,
+                        mesh.triangles.data(), num_triangles, &num_triangles);
   FUZZ_REQUIRE(status == TV_OK);
   mesh.vertices.resize(static_cast<size_t>(num_vertices));
   mesh.triangles.resize(static_cast<size_t>(num_triangles));
@@ -118,7 +127,7 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   options.max_distance = bytes.whole(0, 3) == 0 ? bytes.wild(0, 3) : 0;
   tv_room* room = nullptr;
   const size_t used = bytes.whole(0, 3) == 0 ? TV_ROOM_MIN_BYTES : kMostBytes;
-  if (tv_room_init(&options, memory, used, &room) != TV_OK) return 0;
+  if (tv_room_init(&room, &options, memory, used) != TV_OK) return 0;
   std::vector<Map> held;
   tv_room_plane planes[TV_ROOM_MAX_PLANES];
   int32_t num_planes = 0;
@@ -129,12 +138,13 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     const int kind = bytes.whole(0, 7);
     if (kind < 4) {
       Map m = map_of(bytes);
-      const tv_status status = tv_room_add(room, &m.camera, m.R, m.t, &m.map);
+      const tv_depth_map map = given(m);
+      const tv_status status = tv_room_add(room, &map);
       if (status == TV_OK) held.push_back(std::move(m));
     } else if (kind == 4 && !held.empty()) {
-      const Map& m = held.back();
-      tv_room_see_through(room, &m.camera, m.R, m.t, &m.map);
-      tv_room_remove(room, &m.camera, m.R, m.t, &m.map);
+      const tv_depth_map map = given(held.back());
+      tv_room_see_through(room, &map);
+      tv_room_remove(room, &map);
       held.pop_back();
     } else if (kind == 5) {
       tv_room_coarsen(room);
@@ -150,8 +160,13 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       }
       Map& m = held.back();
       std::vector<float> distance(m.distance.size()), sigma(m.distance.size());
-      tv_room_infer(room, &m.camera, m.R, m.t, &m.map, planes, num_planes, nullptr, scratch,
-                    sizeof scratch, distance.data(), sigma.data(), &num_pixels);
+      const tv_depth_map map = given(m);
+      tv_room_infer_options of_infer;
+      tv_room_infer_options_init(&of_infer);
+      of_infer.planes = planes;
+      of_infer.num_planes = num_planes;
+      tv_room_infer(room, scratch, sizeof scratch, &map, &of_infer, distance.data(), sigma.data(),
+                    &num_pixels);
     } else {
       tv_room_mesh_options of_mesh;
       tv_room_mesh_options_init(&of_mesh);
@@ -177,8 +192,9 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   // What is added and removed again leaves no trace, in a room with memory for it.
   const Mesh before = mesh_of(room, &all);
   const Map m = map_of(bytes);
-  if (tv_room_add(room, &m.camera, m.R, m.t, &m.map) == TV_OK) {
-    FUZZ_REQUIRE(tv_room_remove(room, &m.camera, m.R, m.t, &m.map) == TV_OK);
+  const tv_depth_map map = given(m);
+  if (tv_room_add(room, &map) == TV_OK) {
+    FUZZ_REQUIRE(tv_room_remove(room, &map) == TV_OK);
     if (held.empty()) require_equal(before, mesh_of(room, &all));
   }
   mesh_of(room, &all);

@@ -153,7 +153,7 @@ void run(const Window& given, const tv_window_options& options, size_t size_byte
   void* memory = nullptr;
   FUZZ_REQUIRE(posix_memalign(&memory, TV_CONTEXT_ALIGNMENT, size_bytes) == 0);
   std::memset(memory, byte, size_bytes);
-  out->status = tv_adjust_window(&w.window, &options, memory, size_bytes, out->covariances,
+  out->status = tv_adjust_window(memory, size_bytes, &w.window, &options, out->covariances,
                                  out->errors_px, &out->result);
   std::free(memory);
 }

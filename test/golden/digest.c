@@ -49,7 +49,7 @@ LAYOUT(tv_odometry_state, 632, reserved_end, 628);
 LAYOUT(tv_keyframe, 128, num_observations, 124);
 LAYOUT(tv_map_point, 112, covariance, 40);
 LAYOUT(tv_map_observation, 24, reserved, 20);
-LAYOUT(tv_dense_options, 40, max_relative_sigma, 32);
+LAYOUT(tv_camera_pair, 320, cam1_from_cam0_t, 296);
 LAYOUT(tv_dense_point, 40, grey, 36);
 LAYOUT(tv_room_options, 24, max_distance, 16);
 LAYOUT(tv_room_state, 72, max, 48);
@@ -58,7 +58,6 @@ LAYOUT(tv_room_triangle, 12, idx_vertex, 0);
 LAYOUT(tv_room_mesh_options, 88, max_sigma, 80);
 LAYOUT(tv_room_plane, 88, reserved, 84);
 LAYOUT(tv_room_plane_options, 48, gravity_sigma_rad, 40);
-LAYOUT(tv_room_infer_options, 8, max_step, 4);
 
 enum { MAX_KEYPOINTS = 600, NUM_METHODS = TV_TRIANGULATION_MIDPOINT + 1 };
 
@@ -573,7 +572,7 @@ static void digest_window(const pair *p, tv_context *context) {
     options.loss = part / 3;
     tv_window_result_init(&r);
     must("adjust_window",
-         tv_adjust_window(&window, &options, memory, sizeof memory, covariances, errors_px, &r));
+         tv_adjust_window(memory, sizeof memory, &window, &options, covariances, errors_px, &r));
     if (!r.converged || !r.has_covariance) fail("the window did not converge", TV_OK);
     for (k = 0; k < VIEWS; ++k) {
       add_doubles(d.views[k].R, 9);
@@ -682,19 +681,18 @@ static void digest_points(const pair *p, tv_context *context, const matched *m,
                                                  "linear_ls", "iterative_eigen", "iterative_ls",
                                                  "midpoint"};
   static double corrected[2][2 * MAX_KEYPOINTS], covariances[9 * MAX_KEYPOINTS];
+  const tv_camera_pair cameras = pair_of(&p->camera[0], &p->camera[1], pose->R, pose->t);
   uint8_t valid[MAX_KEYPOINTS];
   int32_t method;
   for (method = 0; method < NUM_METHODS; ++method) {
     start();
-    must("triangulate",
-         tv_triangulate((tv_triangulation)method, &p->camera[0], &p->camera[1], pose->R, pose->t,
-                        m->pixels[0], m->pixels[1], m->count, points));
+    must("triangulate", triangulate_pixels(&cameras, m->pixels[0], m->pixels[1], m->count,
+                                           (tv_triangulation)method, points));
     add_points(points, m->count);
     if (method <= TV_TRIANGULATION_POLY_ABS) {
       must("correct_matches",
-           tv_correct_matches((tv_triangulation)method, &p->camera[0], &p->camera[1], pose->R,
-                              pose->t, m->pixels[0], m->pixels[1], m->count, corrected[0],
-                              corrected[1], valid));
+           correct_pixels_of(&cameras, m->pixels[0], m->pixels[1], m->count,
+                             (tv_triangulation)method, corrected[0], corrected[1], valid));
       add_doubles(corrected[0], 2 * (size_t)m->count);
       add_doubles(corrected[1], 2 * (size_t)m->count);
       add_bytes(valid, (size_t)m->count);
@@ -702,9 +700,9 @@ static void digest_points(const pair *p, tv_context *context, const matched *m,
     print(p, context, names[method]);
   }
   start();
-  must("point_covariances", tv_point_covariances(&p->camera[0], &p->camera[1], pose->R, pose->t,
-                                                 pose->has_covariance ? pose->covariance : NULL,
-                                                 0.5, points, m->count, covariances));
+  must("point_covariances",
+       tv_point_covariances(&cameras, points, m->count, 0.5,
+                            pose->has_covariance ? pose->covariance : NULL, covariances));
   add_doubles(covariances, 9 * (size_t)m->count);
   print(p, context, "point_covariances");
 }
@@ -713,6 +711,7 @@ static void digest_dense(const pair *p, tv_context *context, const matched *m,
                          const tv_two_view *pose, const tv_point *sparse) {
   enum { MOST = 20000 };
   static tv_dense_point points[MOST];
+  const tv_camera_pair cameras = pair_of(&p->camera[0], &p->camera[1], pose->R, pose->t);
   tv_dense_options options;
   size_t bytes;
   uint8_t *block;
@@ -722,14 +721,15 @@ static void digest_dense(const pair *p, tv_context *context, const matched *m,
   tv_dense_options_init(&options);
   options.max_cells = 60000;
   options.max_steps = 64;
+  options.sparse = sparse;
+  options.num_sparse = m->count;
   must("dense_size", tv_dense_size(&p->camera[0], &p->camera[1], &options, &bytes));
   block = (uint8_t *)malloc(bytes + TV_CONTEXT_ALIGNMENT);
   if (block == NULL) fail("dense", TV_ERR_MEMORY);
   start_of_memory = (uintptr_t)block + TV_CONTEXT_ALIGNMENT - 1;
   start_of_memory -= start_of_memory % TV_CONTEXT_ALIGNMENT;
-  must("densify",
-       tv_densify(&p->image[0], &p->image[1], &p->camera[0], &p->camera[1], pose->R, pose->t,
-                  sparse, m->count, &options, (void *)start_of_memory, bytes, points, MOST, &num));
+  must("densify", tv_densify((void *)start_of_memory, bytes, &cameras, p->image, &options, points,
+                             MOST, &num));
   add_bytes(&num, sizeof num);
   add_bytes(points, (size_t)num * sizeof *points);
   free(block);
@@ -775,7 +775,7 @@ static void digest_depth(const pair *p, tv_context *context, const tv_two_view *
   arrays.sigma = arrays.distance + num;
   arrays.witnesses = (uint8_t *)(arrays.sigma + num);
   arrays.grey = arrays.witnesses + num;
-  must("sweep_depth", tv_sweep_depth(views, 2, &options, (void *)memory, bytes, &arrays));
+  must("sweep_depth", tv_sweep_depth((void *)memory, bytes, views, 2, &options, &arrays));
   add_bytes(arrays.distance, 10 * num);
   free(block);
   print(p, context, "depth");
@@ -787,7 +787,6 @@ enum { ROOM_SIDE = 160, ROOM_PIXELS = ROOM_SIDE * ROOM_SIDE };
    its y axis `turns` times, as a chessboard of 24 pixels: distances and texture, or neither. */
 typedef struct box_view {
   tv_depth_map map;
-  double R[9], t[3];
   float distance[ROOM_PIXELS];
   uint8_t pixels[ROOM_PIXELS];
 } box_view;
@@ -798,9 +797,10 @@ static void see_box(const tv_camera *camera, int turns, box_view *v) {
   const double R[9] = {cosines[turns], 0, sines[turns], 0, 1, 0, -sines[turns], 0, cosines[turns]};
   const double t[3] = {0.06 * turns - 0.09, 0.03 * turns, 0.07};
   int32_t k;
-  memcpy(v->R, R, sizeof R);
-  memcpy(v->t, t, sizeof t);
   tv_depth_map_init(&v->map);
+  v->map.camera = camera;
+  memcpy(v->map.world_from_cam_R, R, sizeof R);
+  memcpy(v->map.world_from_cam_t, t, sizeof t);
   v->map.width = v->map.stride = camera->width;
   v->map.height = camera->height;
   v->map.distance = v->distance;
@@ -838,6 +838,7 @@ static void digest_room(const pair *p, tv_context *context) {
   uint8_t *aligned = scratch + TV_CONTEXT_ALIGNMENT - (uintptr_t)scratch % TV_CONTEXT_ALIGNMENT;
   tv_room_plane planes[8];
   tv_room_plane_options options;
+  tv_room_infer_options of_infer;
   tv_camera camera;
   tv_room *room;
   int32_t k, num, num_triangles;
@@ -847,36 +848,38 @@ static void digest_room(const pair *p, tv_context *context) {
                                                          ? p->camera[0].width
                                                          : p->camera[0].height),
                                 &camera));
-  must("room_init", tv_room_init(NULL, memory, BYTES, &room));
+  must("room_init", tv_room_init(&room, NULL, memory, BYTES));
   for (k = 0; k < 4; ++k) {
     see_box(&camera, k, &views[k]);
-    must("room_add", tv_room_add(room, &camera, views[k].R, views[k].t, &views[k].map));
+    must("room_add", tv_room_add(room, &views[k].map));
   }
-  must("room_remove", tv_room_remove(room, &camera, views[1].R, views[1].t, &views[1].map));
+  must("room_remove", tv_room_remove(room, &views[1].map));
   tv_room_plane_options_init(&options);
   options.gravity[1] = 1;
   options.min_area = 0.05;
   must("room_planes", tv_room_find_planes(room, &options, planes, 8, &num));
   add_int(num);
   add_bytes(planes, (size_t)num * sizeof *planes);
+  tv_room_infer_options_init(&of_infer);
+  of_infer.planes = planes;
+  of_infer.num_planes = num;
   for (k = 0; k < 4; ++k) {
     int32_t pixels;
     inferred[k] = views[k];
-    must("room_infer", tv_room_infer(room, &camera, views[k].R, views[k].t, &views[k].map, planes,
-                                     num, NULL, aligned, sizeof scratch - TV_CONTEXT_ALIGNMENT,
-                                     inferred[k].distance, sigma[k], &pixels));
+    must("room_infer",
+         tv_room_infer(room, aligned, sizeof scratch - TV_CONTEXT_ALIGNMENT, &views[k].map,
+                       &of_infer, inferred[k].distance, sigma[k], &pixels));
     add_int(pixels);
     inferred[k].map.distance = inferred[k].distance;
     inferred[k].map.sigma = sigma[k];
     inferred[k].map.inferred = 1;
-    must("room_add inferred",
-         tv_room_add(room, &camera, inferred[k].R, inferred[k].t, &inferred[k].map));
+    must("room_add inferred", tv_room_add(room, &inferred[k].map));
   }
-  must("room_see", tv_room_see_through(room, &camera, views[0].R, views[0].t, &views[0].map));
+  must("room_see", tv_room_see_through(room, &views[0].map));
   for (k = 0; k < 2; ++k) {
     if (k == 1) must("room_coarsen", tv_room_coarsen(room));
     must("room_mesh",
-         tv_room_mesh(room, NULL, vertices, MOST, triangles, 2 * MOST, &num, &num_triangles));
+         tv_room_mesh(room, NULL, vertices, MOST, &num, triangles, 2 * MOST, &num_triangles));
     add_int(num);
     add_int(num_triangles);
     add_bytes(vertices, (size_t)num * sizeof *vertices);
@@ -890,21 +893,19 @@ static void digest_bundle(const pair *p, tv_context *context, const matched *m,
   static tv_point adjusted[MAX_KEYPOINTS];
   tv_bundle_options options;
   tv_bundle_result result;
-  double R[9], t[3];
+  tv_camera_pair cameras;
   start();
   tv_bundle_options_init(&options);
   options.max_iterations = 12;
   for (options.loss = TV_LOSS_NONE; options.loss <= TV_LOSS_CAUCHY; ++options.loss) {
-    memcpy(R, pose->R, sizeof R);
-    memcpy(t, pose->t, sizeof t);
+    cameras = pair_of(&p->camera[0], &p->camera[1], pose->R, pose->t);
     memcpy(adjusted, points, sizeof adjusted);
     tv_bundle_result_init(&result);
-    must("adjust_two_view",
-         adjust_pixels(context, &p->camera[0], &p->camera[1], m->pixels[0], m->pixels[1], m->count,
-                       &options, R, t, adjusted, &result));
+    must("adjust_two_view", adjust_pixels(context, m->pixels[0], m->pixels[1], m->count, &options,
+                                          &cameras, adjusted, &result));
     add_bundle(&result);
-    add_doubles(R, 9);
-    add_doubles(t, 3);
+    add_doubles(cameras.cam1_from_cam0_R, 9);
+    add_doubles(cameras.cam1_from_cam0_t, 3);
     add_points(adjusted, m->count);
   }
   print(p, context, "bundle");

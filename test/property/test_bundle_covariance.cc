@@ -79,9 +79,9 @@ void pose_error(const double R[9], const double t[3], double error[5]) {
 
 void add_points(const double R[9], const double t[3], const double* pose_covariance, Count* count) {
   const Options& o = pair.options;
+  const tv_camera_pair cameras = pair_of(&o.camera[0], &o.camera[1], R, t);
   TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_point_covariances(&o.camera[0], &o.camera[1], R, t, pose_covariance, kNoise, points,
-                                  o.num, covariances));
+      TV_OK, tv_point_covariances(&cameras, points, o.num, kNoise, pose_covariance, covariances));
   for (int i = 0; i < o.num; ++i) {
     if (pair.outlier[i]) continue;
     if (points[i].status != TV_POINT_OK) {
@@ -110,19 +110,18 @@ Counts run(const Options& base, const tv_bundle_options& bundle, int num_pairs, 
     options.seed = base.seed + static_cast<uint64_t>(p);
     if (bundle.hold_pose != 0) options.start_off_rad = 0;
     bundle_scene::make(options, &pair);
-    double R[9], t[3];
-    std::memcpy(R, pair.start_R, sizeof R);
-    std::memcpy(t, pair.start_t, sizeof t);
+    tv_camera_pair cameras =
+        pair_of(&options.camera[0], &options.camera[1], pair.start_R, pair.start_t);
+    const double *const R = cameras.cam1_from_cam0_R, *const t = cameras.cam1_from_cam0_t;
     std::memcpy(points, pair.start, sizeof points);
     tv_bundle_result result;
     tv_bundle_result_init(&result);
-    TEST_ASSERT_EQUAL_INT(
-        TV_OK, adjust_pixels(context, &options.camera[0], &options.camera[1], pair.pixels[0],
-                             pair.pixels[1], options.num, &bundle, R, t, points, &result));
+    TEST_ASSERT_EQUAL_INT(TV_OK, adjust_pixels(context, pair.pixels[0], pair.pixels[1], options.num,
+                                               &bundle, &cameras, points, &result));
     TEST_ASSERT_TRUE(result.converged);
     if (bundle.hold_pose != 0) {
-      TEST_ASSERT_EQUAL_MEMORY(pair.start_R, R, sizeof R);
-      TEST_ASSERT_EQUAL_MEMORY(pair.start_t, t, sizeof t);
+      TEST_ASSERT_EQUAL_MEMORY(pair.start_R, R, sizeof pair.start_R);
+      TEST_ASSERT_EQUAL_MEMORY(pair.start_t, t, sizeof pair.start_t);
       add_points(R, t, nullptr, &counts.points);
       continue;
     }

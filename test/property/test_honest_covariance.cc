@@ -243,8 +243,9 @@ void test_an_uncertain_focal_length_is_refined_and_its_error_covered(void) {
     within += distance_of(r, covariance_of(r)) <= kChiSq95;
     exact_within +=
         exact.has_covariance != 0 && distance_of(exact, covariance_of(exact)) <= kChiSq95;
-    tv_camera corrected;
-    TEST_ASSERT_EQUAL_INT(TV_OK, tv_corrected_camera(&r, &camera, &corrected));
+    tv_camera_pair of_result;
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_corrected_pair(&r, &camera, &camera, &of_result));
+    const tv_camera& corrected = of_result.camera1;
     const double scale = r.focal_scale > 0 ? r.focal_scale : 1;
     TEST_ASSERT_TRUE(corrected.fx == camera.fx * scale && corrected.fy == camera.fy * scale);
     if (r.focal_scale == 0) {

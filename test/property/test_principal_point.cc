@@ -103,9 +103,12 @@ void test_by_default_the_camera_is_as_given(void) {
     const tv_two_view r = by_default(told), with_0 = estimated(told, 0);
     TEST_ASSERT_TRUE(std::memcmp(&r, &with_0, sizeof r) == 0);
     TEST_ASSERT_FALSE(has_shift(r));
-    tv_camera corrected = right;
-    TEST_ASSERT_EQUAL_INT(TV_OK, tv_corrected_camera(&r, &told, &corrected));
-    TEST_ASSERT_TRUE(std::memcmp(&corrected, &told, sizeof told) == 0);
+    tv_camera_pair corrected;
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_corrected_pair(&r, &told, &told, &corrected));
+    TEST_ASSERT_TRUE(std::memcmp(&corrected.camera0, &told, sizeof told) == 0);
+    TEST_ASSERT_TRUE(std::memcmp(&corrected.camera1, &told, sizeof told) == 0);
+    TEST_ASSERT_TRUE(std::memcmp(corrected.cam1_from_cam0_R, r.R, sizeof r.R) == 0);
+    TEST_ASSERT_TRUE(std::memcmp(corrected.cam1_from_cam0_t, r.t, sizeof r.t) == 0);
     contradicted += r.principal_point_chi2 > 13.8155;
   }
   TEST_ASSERT_TRUE(contradicted > 10);  // what stayed was wrong
@@ -289,10 +292,13 @@ void compare(const char* title, const tv_camera& right, double most_error_px, do
     ++shifts;
     within += scene::within_ellipsoid_95(freed, pair.R, pair.t);
     off += std::hypot(freed.principal_point_shift[0] - dx, freed.principal_point_shift[1] - dy);
-    tv_camera corrected = told;
-    TEST_ASSERT_EQUAL_INT(TV_OK, tv_corrected_camera(&freed, &corrected, &corrected));
-    TEST_ASSERT_TRUE(corrected.cx == told.cx + freed.principal_point_shift[0] &&
-                     corrected.cy == told.cy + freed.principal_point_shift[1]);
+    tv_camera_pair corrected{told, told, {}, {}};
+    TEST_ASSERT_EQUAL_INT(
+        TV_OK, tv_corrected_pair(&freed, &corrected.camera0, &corrected.camera1, &corrected));
+    for (const tv_camera& c : {corrected.camera0, corrected.camera1}) {
+      TEST_ASSERT_TRUE(c.cx == told.cx + freed.principal_point_shift[0] &&
+                       c.cy == told.cy + freed.principal_point_shift[1]);
+    }
   }
   std::printf(
       "%s: %d of %d moved, %.1f px from the truth on average, mean error %.3f deg (%.3f with "
@@ -359,8 +365,9 @@ void test_matrices_are_of_the_corrected_camera(void) {
   make_pair(3, 400, right, right);
   const tv_two_view r = estimated(told);
   TEST_ASSERT_TRUE(has_shift(r));
-  tv_camera c;
-  tv_corrected_camera(&r, &told, &c);
+  tv_camera_pair corrected;
+  tv_corrected_pair(&r, &told, &told, &corrected);
+  const tv_camera& c = corrected.camera0;
   double rms[2] = {0, 0};
   for (int i = 0; i < pair.options.num; ++i) {
     for (int which = 0; which < 2; ++which) {
@@ -458,12 +465,13 @@ void test_options_out_of_range_are_refused(void) {
   for (double bad : {std::nan(""), std::numeric_limits<double>::infinity()}) {
     TEST_ASSERT_EQUAL_INT(TV_ERR_NOT_FINITE, estimate(c, c, bad, false, &result));
   }
-  tv_camera out;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_corrected_camera(nullptr, &c, &out));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_corrected_camera(&result, nullptr, &out));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_corrected_camera(&result, &c, nullptr));
+  tv_camera_pair out;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_corrected_pair(nullptr, &c, &c, &out));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_corrected_pair(&result, nullptr, &c, &out));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_corrected_pair(&result, &c, nullptr, &out));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_corrected_pair(&result, &c, &c, nullptr));
   result.struct_size = 1;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_STRUCT_SIZE, tv_corrected_camera(&result, &c, &out));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_STRUCT_SIZE, tv_corrected_pair(&result, &c, &c, &out));
 }
 
 }  // namespace

@@ -677,14 +677,14 @@ void adjust(const double* pixels0, const double* pixels1, int num, const float* 
   tv_pixel_pairs pairs = pairs_of(pixels0, pixels1, nullptr, num);
   pairs.sigmas0 = sigmas0;
   pairs.sigmas1 = sigmas1;
-  std::memcpy(out->R, bundle.start_R, sizeof out->R);
-  std::memcpy(out->t, bundle.start_t, sizeof out->t);
   std::memcpy(out->points, points, static_cast<size_t>(num) * sizeof points[0]);
   tv_bundle_result_init(&out->result);
   const bundle_scene::Options& o = bundle.options;
+  tv_camera_pair cameras = pair_of(&o.camera[0], &o.camera[1], bundle.start_R, bundle.start_t);
   TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_adjust_two_view(context, &o.camera[0], &o.camera[1], &pairs, &options, out->R,
-                                out->t, out->points, &out->result));
+      TV_OK, tv_adjust_two_view(context, &pairs, &options, &cameras, out->points, &out->result));
+  std::memcpy(out->R, cameras.cam1_from_cam0_R, sizeof out->R);
+  std::memcpy(out->t, cameras.cam1_from_cam0_t, sizeof out->t);
 }
 
 // By least squares a match of sigma 1/2 counts as four equal ones of sigma 1. Bundle adjustment

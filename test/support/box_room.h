@@ -62,7 +62,7 @@ inline void look_at(const Vec3& from, const Vec3& to, double R[9], double t[3]) 
   }
 }
 
-// A map that owns its arrays.
+// A map that owns its arrays, its camera and its pose.
 struct Map {
   tv_camera camera = {};
   double R[9], t[3];
@@ -70,6 +70,15 @@ struct Map {
   std::vector<uint8_t> pixels;
   tv_depth_map map;
 };
+
+// The map as the library is given it.
+inline tv_depth_map given(const Map& m) {
+  tv_depth_map map = m.map;
+  map.camera = &m.camera;
+  std::copy(m.R, m.R + 9, map.world_from_cam_R);
+  std::copy(m.t, m.t + 3, map.world_from_cam_t);
+  return map;
+}
 
 inline void aim(Map* m) {
   tv_depth_map_init(&m->map);

@@ -4,6 +4,7 @@
 #ifndef TEST_SUPPORT_BUNDLE_SCENE_H
 #define TEST_SUPPORT_BUNDLE_SCENE_H
 
+#include "support/calls.h"
 #include "support/scene.h"
 #include "twoview/bundle.h"
 #include "twoview/triangulate.h"
@@ -84,9 +85,9 @@ inline void make_match(tv::Random* random, const tv::Camera cameras[2], int i, S
 }
 
 inline void triangulate(const Options& o, Scene* s) {
-  TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_triangulate(TV_TRIANGULATION_ITERATIVE_LS, &o.camera[0], &o.camera[1], s->start_R,
-                            s->start_t, s->pixels[0], s->pixels[1], o.num, s->start));
+  const tv_camera_pair pair = pair_of(&o.camera[0], &o.camera[1], s->start_R, s->start_t);
+  TEST_ASSERT_EQUAL_INT(TV_OK, triangulate_pixels(&pair, s->pixels[0], s->pixels[1], o.num,
+                                                  TV_TRIANGULATION_ITERATIVE_LS, s->start));
 }
 
 inline void make(const Options& options, Scene* s) {

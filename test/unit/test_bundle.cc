@@ -49,8 +49,12 @@ void begin() {
 }
 
 tv_status adjust(const tv_bundle_options& bundle) {
-  return adjust_pixels(context, &pair.options.camera[0], &pair.options.camera[1], pair.pixels[0],
-                       pair.pixels[1], pair.options.num, &bundle, R, t, points, &result);
+  tv_camera_pair cameras = pair_of(&pair.options.camera[0], &pair.options.camera[1], R, t);
+  const tv_status status = adjust_pixels(context, pair.pixels[0], pair.pixels[1], pair.options.num,
+                                         &bundle, &cameras, points, &result);
+  std::memcpy(R, cameras.cam1_from_cam0_R, sizeof R);
+  std::memcpy(t, cameras.cam1_from_cam0_t, sizeof t);
+  return status;
 }
 
 // ---- tests of one match ----

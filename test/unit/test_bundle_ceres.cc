@@ -196,11 +196,14 @@ Answer solve_ours(const Scene& s, const tv_bundle_options& options, Start* end,
   std::memcpy(points, s.start, sizeof points);
   end->points = points;
   tv_bundle_result_init(result);
+  tv_camera_pair cameras = pair_of(&s.options.camera[0], &s.options.camera[1], end->R, end->t);
   const double begin = now_ms();
-  TEST_ASSERT_EQUAL_INT(
-      TV_OK, adjust_pixels(context, &s.options.camera[0], &s.options.camera[1], s.pixels[0],
-                           s.pixels[1], s.options.num, &options, end->R, end->t, points, result));
-  return Answer{result->initial_cost, result->final_cost, now_ms() - begin, result->num_points,
+  TEST_ASSERT_EQUAL_INT(TV_OK, adjust_pixels(context, s.pixels[0], s.pixels[1], s.options.num,
+                                             &options, &cameras, points, result));
+  const double ms = now_ms() - begin;
+  std::memcpy(end->R, cameras.cam1_from_cam0_R, sizeof cameras.cam1_from_cam0_R);
+  std::memcpy(end->t, cameras.cam1_from_cam0_t, sizeof cameras.cam1_from_cam0_t);
+  return Answer{result->initial_cost, result->final_cost, ms, result->num_points,
                 result->num_iterations};
 }
 

@@ -278,14 +278,16 @@ void check_scene(const char* name, const tv_camera& camera0, const tv_camera& ca
   TEST_ASSERT_TRUE(bytes <= sizeof memory);
   const tv_image images[2] = {{pixels[0], camera0.width, camera0.height, camera0.width},
                               {pixels[1], camera1.width, camera1.height, camera1.width}};
-  double rotation[9], translation[3];
-  for (int i = 0; i < 9; ++i) rotation[i] = R(i / 3, i % 3);
-  for (int i = 0; i < 3; ++i) translation[i] = t[i];
+  tv_camera_pair cameras{camera0, camera1, {}, {}};
+  for (int i = 0; i < 9; ++i) cameras.cam1_from_cam0_R[i] = R(i / 3, i % 3);
+  for (int i = 0; i < 3; ++i) cameras.cam1_from_cam0_t[i] = t[i];
+  tv_dense_options options;
+  tv_dense_options_init(&options);
+  options.sparse = sparse.data();
+  options.num_sparse = static_cast<int32_t>(sparse.size());
   int32_t num = 0;
   TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_densify(&images[0], &images[1], &camera0, &camera1, rotation, translation,
-                        sparse.data(), static_cast<int32_t>(sparse.size()), nullptr, memory, bytes,
-                        points, 400000, &num));
+      TV_OK, tv_densify(memory, bytes, &cameras, images, &options, points, 400000, &num));
   std::vector<double> errors, pulls;
   double worst_pixel = 0, worst_ray = 0;
   for (int32_t i = 0; i < num; ++i) {

@@ -89,7 +89,7 @@ Figures measure(const char* name, const tv_camera& camera, const Pose* poses, in
   const int width = map_camera.width, height = map_camera.height;
   TEST_ASSERT_TRUE(width >= kWidth && height >= kHeight && width * height <= kMapPixels);
   const tv_depth_arrays arrays = {distances, sigmas, witnesses, grey};
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_sweep_depth(views, num_views, &options, memory, bytes, &arrays));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_sweep_depth(memory, bytes, views, num_views, &options, &arrays));
   const tv::Camera prepared = tv::prepare_camera(map_camera);
   std::vector<double> errors, in_sigma;
   int inside = 0;
@@ -256,7 +256,7 @@ void test_the_order_of_the_other_views_does_not_matter(void) {
   size_t bytes = 0;
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_depth_size(&camera, &options, &bytes));
   const tv_depth_arrays arrays = {distances, sigmas, witnesses, nullptr};
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_sweep_depth(views, kViews, &options, memory, bytes, &arrays));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_sweep_depth(memory, bytes, views, kViews, &options, &arrays));
   TEST_ASSERT_EQUAL_MEMORY(first, distances, sizeof first);
 }
 

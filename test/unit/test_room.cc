@@ -34,26 +34,33 @@ tv_room* new_room(double voxel = kVoxel, size_t bytes = sizeof memory) {
   tv_room_options_init(&options);
   options.voxel = voxel;
   tv_room* room = nullptr;
-  TEST_ASSERT_EQUAL(TV_OK, tv_room_init(&options, memory, bytes, &room));
+  TEST_ASSERT_EQUAL(TV_OK, tv_room_init(&room, &options, memory, bytes));
   return room;
 }
 
 tv_status add(tv_room* room, const Map& m) {
-  return tv_room_add(room, &m.camera, m.R, m.t, &m.map);
+  const tv_depth_map map = box_room::given(m);
+  return tv_room_add(room, &map);
 }
 
 tv_status remove(tv_room* room, const Map& m) {
-  return tv_room_remove(room, &m.camera, m.R, m.t, &m.map);
+  const tv_depth_map map = box_room::given(m);
+  return tv_room_remove(room, &map);
+}
+
+tv_status see_through(tv_room* room, const Map& m) {
+  const tv_depth_map map = box_room::given(m);
+  return tv_room_see_through(room, &map);
 }
 
 void mesh(tv_room* room, const tv_room_mesh_options* options = nullptr) {
   int32_t nv, nt;
-  const tv_status status = tv_room_mesh(room, options, nullptr, 0, nullptr, 0, &nv, &nt);
+  const tv_status status = tv_room_mesh(room, options, nullptr, 0, &nv, nullptr, 0, &nt);
   TEST_ASSERT_EQUAL(nv == 0 ? TV_OK : TV_ERR_CAPACITY, status);
   vertices.resize(static_cast<size_t>(nv));
   triangles.resize(static_cast<size_t>(nt));
   TEST_ASSERT_EQUAL(
-      TV_OK, tv_room_mesh(room, options, vertices.data(), nv, triangles.data(), nt, &nv, &nt));
+      TV_OK, tv_room_mesh(room, options, vertices.data(), nv, &nv, triangles.data(), nt, &nt));
   vertices.resize(static_cast<size_t>(nv));
   triangles.resize(static_cast<size_t>(nt));
 }
@@ -287,13 +294,13 @@ void test_a_map_sees_through_later_blocks_when_told_and_is_removed_exactly_then(
   const size_t before = vertices_near(1);
   TEST_ASSERT_TRUE(before > 500);
   for (const Map& m : right) {
-    TEST_ASSERT_EQUAL(TV_OK, tv_room_see_through(room, &m.camera, m.R, m.t, &m.map));
+    TEST_ASSERT_EQUAL(TV_OK, see_through(room, m));
   }
   mesh(room);
   TEST_ASSERT_EQUAL(0, vertices_near(1));
   // A second time nothing is left to see through: after a removal the sums are those from before.
   for (const Map& m : right) {
-    TEST_ASSERT_EQUAL(TV_OK, tv_room_see_through(room, &m.camera, m.R, m.t, &m.map));
+    TEST_ASSERT_EQUAL(TV_OK, see_through(room, m));
   }
   for (const Map& m : right) TEST_ASSERT_EQUAL(TV_OK, remove(room, m));
   mesh(room);
@@ -468,8 +475,12 @@ Planes find_planes(tv_room* room, bool with_gravity) {
 Map infer(tv_room* room, const Map& m, const Planes& planes, int32_t* num) {
   alignas(64) static uint8_t scratch[1 << 20];
   Map inferred = m;
-  TEST_ASSERT_EQUAL(TV_OK, tv_room_infer(room, &m.camera, m.R, m.t, &m.map, planes.planes,
-                                         planes.num, nullptr, scratch, sizeof scratch,
+  const tv_depth_map map = box_room::given(m);
+  tv_room_infer_options options;
+  tv_room_infer_options_init(&options);
+  options.planes = planes.planes;
+  options.num_planes = planes.num;
+  TEST_ASSERT_EQUAL(TV_OK, tv_room_infer(room, scratch, sizeof scratch, &map, &options,
                                          inferred.distance.data(), inferred.sigma.data(), num));
   box_room::aim(&inferred);
   inferred.map.inferred = 1;
@@ -521,7 +532,7 @@ void test_plain_walls_are_found_by_their_edges_and_inferred_between() {
   const size_t measured = vertices.size();
   for (const Map& m : inferred) TEST_ASSERT_EQUAL(TV_OK, add(room, m));
   for (const Map& m : maps) {
-    TEST_ASSERT_EQUAL(TV_OK, tv_room_see_through(room, &m.camera, m.R, m.t, &m.map));
+    TEST_ASSERT_EQUAL(TV_OK, see_through(room, m));
   }
   mesh(room);
   size_t num_inferred = 0, off = 0;
@@ -717,8 +728,7 @@ void test_an_inferred_wall_that_a_map_sees_through_vanishes() {
   TEST_ASSERT_EQUAL(TV_OK, add(room, inferred));
   mesh(room);
   TEST_ASSERT_TRUE(vertices_near(1) > 500);
-  TEST_ASSERT_EQUAL(
-      TV_OK, tv_room_see_through(room, &measured.camera, measured.R, measured.t, &measured.map));
+  TEST_ASSERT_EQUAL(TV_OK, see_through(room, measured));
   mesh(room);
   TEST_ASSERT_EQUAL(0, vertices_near(1));
   TEST_ASSERT_TRUE(vertices_near(2) > 500);

@@ -63,7 +63,7 @@ tv_status adjust(Scene* s, const tv_window_options& options, double* covariances
   if (memory.size() < size + 64) memory.resize(size + 64);
   void* aligned = memory.data() + (64 - reinterpret_cast<uintptr_t>(memory.data()) % 64) % 64;
   tv_window_result_init(result);
-  return tv_adjust_window(&window, &options, aligned, size, covariances, nullptr, result);
+  return tv_adjust_window(aligned, size, &window, &options, covariances, nullptr, result);
 }
 
 tv::WindowPose pose_of(const tv_window_view& view) {

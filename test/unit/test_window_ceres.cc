@@ -230,7 +230,7 @@ Answer solve_ours(Scene* s, const tv_window_options& options, tv_window_result* 
   tv_window_result_init(result);
   const double begin = now_ms();
   TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_adjust_window(&window, &options, aligned, size, nullptr, nullptr, result));
+      TV_OK, tv_adjust_window(aligned, size, &window, &options, nullptr, nullptr, result));
   return Answer{result->initial_cost, result->final_cost, now_ms() - begin, result->num_iterations};
 }
 

@@ -87,18 +87,18 @@ TV_API void tv_bundle_result_init_sized(tv_bundle_result *result, size_t struct_
 
 /* Minimises the sum of rho over the matches, over the pose (R and the direction of t; the length of
    t is kept) and the points, by the Levenberg-Marquardt method.
-   pairs: the matched pixels, one pair for each point; ratios are not read. Where they have sigmas,
+   pixels: the matched pixels, one pair for each point; ratios are not read. Where they have sigmas,
    e0 and e1 are divided by them, and all that the result states in pixels is in units of sigma.
    error_px of a point is in pixels of the images.
-   R, t: the start before the call, the result after it. cam1_from_cam0: x1 = R x0 + t; R is a
-   row-major 3x3 rotation to within 1e-6, t is not zero.
-   points: pairs->num points, for example of tv_triangulate; the start before the call, the result
+   options: null means the defaults.
+   pair: the cameras, which stay as they are, and the motion: the start before the call, the result
+   after it.
+   points: pixels->num points, for example of tv_triangulate; the start before the call, the result
    after it (position, angle, error and status). A point takes part if its status is TV_POINT_OK or
    TV_POINT_INFINITE, both lenses can see it, both pixels are finite and within a million pixels,
    and it is farther from camera 0 than a millionth of |t|. All other points stay as they are: set a
    point's status to TV_POINT_INVALID to exclude its match. A point may be at infinity and may pass
    through it; a point whose rays diverge receives the status TV_POINT_BEHIND.
-   options: null means the defaults.
    result: null, or initialised by tv_bundle_result_init.
    No output overlaps another argument. Equal inputs give equal bytes on every CPU; the order of the
    matches is the order in which sums are formed.
@@ -106,31 +106,30 @@ TV_API void tv_bundle_result_init_sized(tv_bundle_result *result, size_t struct_
    TV_ERR_NOT_FINITE (R, t, an option or a sigma), TV_ERR_CAMERA, TV_ERR_LIMITS (more points than
    the context's max_matches, or a context without TV_PURPOSE_ADJUST), TV_ERR_OVERLAP.
    Time: at most max_iterations passes over the points. Memory: from the context. */
-TV_API tv_status tv_adjust_two_view(tv_context *context, const tv_camera *camera0,
-                                    const tv_camera *camera1, const tv_pixel_pairs *pairs,
-                                    const tv_bundle_options *options, double R[9], double t[3],
+TV_API tv_status tv_adjust_two_view(tv_context *context, const tv_pixel_pairs *pixels,
+                                    const tv_bundle_options *options, tv_camera_pair *pair,
                                     tv_point *points, tv_bundle_result *result);
 
 /* Computes the covariance of each point's position to first order.
-   R, t: the pose, as for tv_adjust_two_view.
+   pair: the cameras and the motion, as for tv_triangulate.
+   points: num_points. The result is exact to first order for points of the smallest error, as
+   tv_adjust_two_view computes them, and nearly so for others.
    noise_px: the standard deviation of both pixels of a match along each axis, [0, 1e9]; the noise
    is taken as independent. For a match whose pixels have the sigma s (tv_pixel_pairs), give s times
-   the noise of an estimate. pose_covariance: that of R and t, 25 numbers in the parameters of
-   tv_bundle_result, in radians^2; null means that the pose is exact. With that of a bundle
-   adjustment, the result is the point's own block of the joint covariance. points: num_points. The
-   result is exact to first order for points of the smallest error, as tv_adjust_two_view computes
-   them, and nearly so for others. covariances: room for num_points x 9, a row-major symmetric 3x3
-   each, in the frame of camera 0 and in the squared unit of t. A covariance is zero where it is not
-   known: the point is not TV_POINT_OK, a lens cannot see it, or it lies on the baseline and its
-   depth is undetermined. The first order is accurate where the depth is known to within a few
-   percent. Beyond that, the true uncertainty is longer on the far side than on the near side.
+   the noise of an estimate.
+   pose_covariance: that of the motion, 25 numbers in the parameters of tv_bundle_result, in
+   radians^2; null means that the motion is exact. With that of a bundle adjustment, the result is
+   the point's own block of the joint covariance.
+   covariances: room for num_points x 9, a row-major symmetric 3x3 each, in the frame of camera 0
+   and in the squared unit of t. A covariance is zero where it is not known: the point is not
+   TV_POINT_OK, a lens cannot see it, or it lies on the baseline and its depth is undetermined. The
+   first order is accurate where the depth is known to within a few percent. Beyond that, the true
+   uncertainty is longer on the far side than on the near side.
    Returns TV_ERR_NULL, TV_ERR_ARGUMENT (the count, R, t or the noise), TV_ERR_NOT_FINITE (R, t, the
    noise or pose_covariance), TV_ERR_CAMERA, TV_ERR_OVERLAP. Needs no context. Thread-safe. */
-TV_API tv_status tv_point_covariances(const tv_camera *camera0, const tv_camera *camera1,
-                                      const double R[9], const double t[3],
-                                      const double *pose_covariance, double noise_px,
-                                      const tv_point *points, int32_t num_points,
-                                      double *covariances);
+TV_API tv_status tv_point_covariances(const tv_camera_pair *pair, const tv_point *points,
+                                      int32_t num_points, double noise_px,
+                                      const double *pose_covariance, double *covariances);
 
 TV_END_DECLS
 

@@ -33,10 +33,15 @@ typedef struct tv_dense_options {
      to a multiple of 32. A step is as wide as a cell; where the range of parallax has more steps,
      all cells are larger. Time and memory grow in proportion. */
   int32_t max_steps;
-  /* Must be 0. */
-  int32_t reserved;
+  /* How many points `sparse` has, at least 0; default 0. */
+  int32_t num_sparse;
+  /* Points of the same cameras and motion, as tv_triangulate and tv_reconstruct give them: those of
+     status TV_POINT_OK give the range of parallax. Null (default): none. They are read during the
+     call only, and not by tv_dense_size. */
+  const tv_point *sparse;
   /* The range of parallax that is searched, in radians, [0, pi]. With a max_parallax_rad of 0
-     (default) the range comes from the points that tv_densify is given. */
+     (default) the range comes from `sparse`; where that has no point of status TV_POINT_OK, the
+     range begins at 0. */
   double min_parallax_rad, max_parallax_rad;
   /* The largest standard deviation of a point's distance, as a share of the distance, of a point
      that is returned; (0, 1], default 0.05. */
@@ -75,16 +80,14 @@ TV_API tv_status tv_dense_size(const tv_camera *camera0, const tv_camera *camera
                                const tv_dense_options *options, size_t *size_bytes);
 
 /* Computes up to cap_points points that both images show.
-   image0, image1: of the width and height of their cameras (else TV_ERR_CAMERA), at most 16384 a
-   side. camera0, camera1: any model. With a two-view result they are those of tv_corrected_camera.
-   R, t: cam1_from_cam0, that is x1 = R x0 + t. R is a row-major 3x3 rotation to within 1e-6; t is
-   not zero. Any motion will do, forward and backward, too; near an epipole, where there is no
-   parallax, there are no points.
-   sparse: num_sparse points of the same cameras and pose, as tv_triangulate and tv_reconstruct give
-   them; those of status TV_POINT_OK give the range of parallax. Null where num_sparse is 0; without
-   any of that status, and without a range in the options, the range begins at 0.
    memory: starts at a multiple of TV_CONTEXT_ALIGNMENT and has at least the bytes of tv_dense_size.
-   It is free for other use after the call.
+   Its contents before and after the call do not matter.
+   pair: the cameras, of any model, and the motion: with a result of tv_estimate_two_view or
+   tv_reconstruct, the pair of tv_corrected_pair. Any motion will do, forward and backward, too;
+   near an epipole, where there is no parallax, there are no points.
+   images: image 0 and image 1, of the width and height of their cameras (else TV_ERR_CAMERA), at
+   most 16384 a side.
+   options: null means the defaults.
    points: room for cap_points. *num_points is how many were written; where more were found, those
    that are returned are spread evenly over them. The order is along the epipolar planes. Points and
    num_points overlap nothing else (TV_ERR_OVERLAP).
@@ -96,10 +99,8 @@ TV_API tv_status tv_dense_size(const tv_camera *camera0, const tv_camera *camera
    desktop core. Needs no context. Thread-safe. Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE,
    TV_ERR_ARGUMENT (an option, a count, an image, R or t), TV_ERR_NOT_FINITE (an option, R or t),
    TV_ERR_CAMERA, TV_ERR_ALIGNMENT, TV_ERR_MEMORY, TV_ERR_OVERLAP. */
-TV_API tv_status tv_densify(const tv_image *image0, const tv_image *image1,
-                            const tv_camera *camera0, const tv_camera *camera1, const double R[9],
-                            const double t[3], const tv_point *sparse, int32_t num_sparse,
-                            const tv_dense_options *options, void *memory, size_t size_bytes,
+TV_API tv_status tv_densify(void *memory, size_t size_bytes, const tv_camera_pair *pair,
+                            const tv_image images[2], const tv_dense_options *options,
                             tv_dense_point *points, int32_t cap_points, int32_t *num_points);
 
 TV_END_DECLS

@@ -97,9 +97,9 @@ TV_API tv_status tv_depth_size(const tv_camera *reference, const tv_depth_option
 /* Computes the depth of views[0] from all views. They should look at the same scene from centres
    that are 5 to 30 per cent of its depth away, best in different directions, and be turned by at
    most 20 degrees. A view from the same centre contributes nothing.
-   views: num_views of them, [2, options->max_views]. options: not null, because of the range.
    memory: starts at a multiple of TV_CONTEXT_ALIGNMENT and has at least the bytes of tv_depth_size.
-   It is free for other use after the call.
+   Its contents before and after the call do not matter.
+   views: num_views of them, [2, options->max_views]. options: not null, because of the range.
    arrays: what is written; nothing of it overlaps anything else (TV_ERR_OVERLAP).
    A pixel is unknown where fewer than two views show it, where the best plane is the first or the
    last one, and where the standard deviation is above max_relative_sigma.
@@ -108,8 +108,8 @@ TV_API tv_status tv_depth_size(const tv_camera *reference, const tv_depth_option
    Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (an option, the range, num_views, an
    image, R), TV_ERR_NOT_FINITE (an option, R or t), TV_ERR_CAMERA, TV_ERR_ALIGNMENT,
    TV_ERR_MEMORY, TV_ERR_OVERLAP. */
-TV_API tv_status tv_sweep_depth(const tv_depth_view *views, int32_t num_views,
-                                const tv_depth_options *options, void *memory, size_t size_bytes,
+TV_API tv_status tv_sweep_depth(void *memory, size_t size_bytes, const tv_depth_view *views,
+                                int32_t num_views, const tv_depth_options *options,
                                 const tv_depth_arrays *arrays);
 
 TV_END_DECLS

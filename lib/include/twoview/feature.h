@@ -143,24 +143,25 @@ TV_API tv_status tv_detect(tv_context *context, const tv_image *image, const tv_
 
 /* Writes the given keypoints with their dominant orientation, as options->orientation selects. A
    keypoint with two orientations is written twice in a row. The order is that of the input, of
-   which x, y and size are read. oriented: room for cap_oriented keypoints; it overlaps no other
-   argument. *num_oriented: how many were written; on TV_ERR_CAPACITY how many there are. Returns
-   the statuses as tv_detect does, and TV_ERR_NOT_FINITE. */
-TV_API tv_status tv_orient(tv_context *context, const tv_image *image,
-                           const tv_feature_options *options, const tv_keypoint *keypoints,
-                           int32_t num_keypoints, tv_keypoint *oriented, int32_t cap_oriented,
-                           int32_t *num_oriented);
+   which x, y and size are read. options: null means the defaults. oriented: room for cap_oriented
+   keypoints; it overlaps no other argument. *num_oriented: how many were written; on
+   TV_ERR_CAPACITY how many there are. Returns the statuses as tv_detect does, and
+   TV_ERR_NOT_FINITE. */
+TV_API tv_status tv_orient(tv_context *context, const tv_image *image, const tv_keypoint *keypoints,
+                           int32_t num_keypoints, const tv_feature_options *options,
+                           tv_keypoint *oriented, int32_t cap_oriented, int32_t *num_oriented);
 
 /* Computes the descriptors of the given keypoints, of which x, y, size and angle_rad are read.
-   descriptors: room for num_keypoints x TV_DESCRIPTOR_BYTES; row i describes keypoint i. A row
-   holds 4 x 4 cells of 8 directions at index (cell_y * 4 + cell_x) * 8 + direction, in the frame
-   that angle_rad turns; directions count counter-clockwise from x as seen in the image. This is the
-   UBC order, which OpenCV and COLMAP use, too. Beyond the image's border, the nearest pixels of the
-   border are repeated. A patch of one grey level gives a descriptor of zeros. Returns TV_ERR_NULL,
-   TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS, TV_ERR_NOT_FINITE, TV_ERR_OVERLAP. */
+   options: null means the defaults. descriptors: room for num_keypoints x TV_DESCRIPTOR_BYTES; row
+   i describes keypoint i. A row holds 4 x 4 cells of 8 directions at index (cell_y * 4 + cell_x) *
+   8 + direction, in the frame that angle_rad turns; directions count counter-clockwise from x as
+   seen in the image. This is the UBC order, which OpenCV and COLMAP use, too. Beyond the image's
+   border, the nearest pixels of the border are repeated. A patch of one grey level gives a
+   descriptor of zeros. Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS,
+   TV_ERR_NOT_FINITE, TV_ERR_OVERLAP. */
 TV_API tv_status tv_describe(tv_context *context, const tv_image *image,
-                             const tv_feature_options *options, const tv_keypoint *keypoints,
-                             int32_t num_keypoints, uint8_t *descriptors);
+                             const tv_keypoint *keypoints, int32_t num_keypoints,
+                             const tv_feature_options *options, uint8_t *descriptors);
 
 /* Detects, orients and describes over one pyramid: tv_detect, tv_orient and tv_describe in one
    call, which is what most programs need. mask, keypoints, *num_keypoints and statuses are as for

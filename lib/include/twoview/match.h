@@ -76,6 +76,16 @@ TV_API tv_status tv_match(tv_context *context, const tv_features *features0,
                           tv_correspondence *correspondences, int32_t cap_correspondences,
                           int32_t *num_correspondences);
 
+/* The epipolar geometry of two images, as an input of tv_match_guided. The caller fills every
+   field; the cameras are read during the call only. */
+typedef struct tv_epipolar {
+  /* Both cameras, any models, where `matrix` is E; both null where it is F. */
+  const tv_camera *camera0, *camera1;
+  /* Row-major 3x3 of any scale, finite: E (tv_two_view.E) where there are cameras, for which the
+     band is measured in pixels of the images as given; else F of the pixels (tv_two_view.F). */
+  double matrix[9];
+} tv_epipolar;
+
 /* Options of tv_match_guided. Filled by tv_guided_options_init. */
 typedef struct tv_guided_options {
   /* The caller's sizeof, set by tv_guided_options_init. */
@@ -110,9 +120,7 @@ TV_API void tv_guided_options_init_sized(tv_guided_options *options, size_t stru
    distance to the second nearest keypoint in the band, the larger of the two directions. Of equal
    distances the one with the lower index counts as nearer. Exchanged views with the transposed
    matrix give the same pairs, exchanged. A keypoint outside its lens's valid region is not matched.
-   camera0, camera1: both cameras, with E in `epipolar` (tv_two_view.E); any lens is possible, since
-   the band is measured in pixels of the images as given. Or both null, with F of the pixels.
-   epipolar: row-major 3x3, finite.
+   epipolar: the known geometry. One camera alone is TV_ERR_ARGUMENT.
    features0, features1: keypoints and descriptors of the two images. Every field of the keypoints
    is checked as tv_describe checks it. options: null means the defaults. correspondences: room for
    cap_correspondences, in ascending order of idx0; the smaller of both counts of features is always
@@ -121,8 +129,7 @@ TV_API void tv_guided_options_init_sized(tv_guided_options *options, size_t stru
    TV_ERR_NOT_FINITE, TV_ERR_CAPACITY, TV_ERR_OVERLAP.
    Time: a product of three numbers for each pair of keypoints, and 128 multiply-adds, at most
    twice, for each pair in a band. */
-TV_API tv_status tv_match_guided(tv_context *context, const tv_camera *camera0,
-                                 const tv_camera *camera1, const double epipolar[9],
+TV_API tv_status tv_match_guided(tv_context *context, const tv_epipolar *epipolar,
                                  const tv_features *features0, const tv_features *features1,
                                  const tv_guided_options *options,
                                  tv_correspondence *correspondences, int32_t cap_correspondences,
@@ -135,25 +142,26 @@ TV_API tv_status tv_match_guided(tv_context *context, const tv_camera *camera0,
    stays. The other one moves by at most 1.2 times its size over size_of_one, in pixels; only x and
    y change. Neither moves where the samples leave the image, have too little texture, or do not
    fit. Exchanged images give the same positions. Two matches one after the other whose keypoints
-   are at the same places, as of a corner with two orientations, move together. image0, image1: the
-   images of the keypoints, within the context's limits. size_of_one: the size of a keypoint of the
-   full image, (0, 4096], best tv_feature_options.keypoint_size. keypoints0, keypoints1:
-   num_keypoints0 and num_keypoints1; every field is checked as tv_describe checks it. matches:
-   num_matches, as tv_match returns them; where a keypoint is part of several matches, they are
-   aligned in their order, and exchanged images may give other positions. aligned: room for
-   num_matches bytes; a byte is 0 where the match was not aligned, else the standard deviation of
-   the aligned position over that of its keypoints, in 128ths, 1 to 255: the less the pixels differ
-   after the fit and the more texture they have, the smaller it is. tv_reconstruct multiplies the
-   sigmas of both keypoints (tv_keypoint_sigmas) of such a match by byte / 128. Returns TV_ERR_NULL,
-   TV_ERR_ARGUMENT (also an index out of its range), TV_ERR_NOT_FINITE, TV_ERR_LIMITS,
-   TV_ERR_OVERLAP; nothing is written then. The context is one made for TV_PURPOSE_EXTRACT. Time:
-   at most four fits of 64 samples a match. docs/algorithms/match.md. */
-TV_API tv_status tv_align_matches(tv_context *context, const tv_image *image0,
-                                  const tv_image *image1, float size_of_one,
-                                  tv_keypoint *keypoints0, int32_t num_keypoints0,
-                                  tv_keypoint *keypoints1, int32_t num_keypoints1,
+   are at the same places, as of a corner with two orientations, move together.
+   images: image 0 and image 1, within the context's limits.
+   matches: num_matches, as tv_match returns them; where a keypoint is part of several matches, they
+   are aligned in their order, and exchanged images may give other positions.
+   size_of_one: the size of a keypoint of the full image, (0, 4096], best
+   tv_feature_options.keypoint_size.
+   keypoints: the arrays of both images, num_keypoints[0] and num_keypoints[1] long: as they were
+   found before the call, moved after it. Every field is checked as tv_describe checks it.
+   aligned: room for num_matches bytes; a byte is 0 where the match was not aligned, else the
+   standard deviation of the aligned position over that of its keypoints, in 128ths, 1 to 255: the
+   less the pixels differ after the fit and the more texture they have, the smaller it is.
+   tv_reconstruct multiplies the sigmas of both keypoints (tv_keypoint_sigmas) of such a match by
+   byte / 128.
+   Returns TV_ERR_NULL, TV_ERR_ARGUMENT (also an index out of its range), TV_ERR_NOT_FINITE,
+   TV_ERR_LIMITS, TV_ERR_OVERLAP; nothing is written then. The context is one made for
+   TV_PURPOSE_EXTRACT. Time: at most four fits of 64 samples a match. docs/algorithms/match.md. */
+TV_API tv_status tv_align_matches(tv_context *context, const tv_image images[2],
                                   const tv_correspondence *matches, int32_t num_matches,
-                                  uint8_t *aligned);
+                                  float size_of_one, tv_keypoint *const keypoints[2],
+                                  const int32_t num_keypoints[2], uint8_t *aligned);
 
 TV_END_DECLS
 

@@ -314,19 +314,16 @@ TV_API tv_status tv_odometry_finish(tv_odometry *odometry);
 
 /* Estimates the pose of a frame from the map as it is, without changing it: for a frame from before
    the map began, or of another flight.
-   image: as tv_odometry_frame.image. state: as for tv_odometry_track; its status is
-   TV_ODOMETRY_TRACKING, TV_ODOMETRY_WEAK or TV_ODOMETRY_LOST, and its scale that of the segment
-   which is tracked. near_id: the id of a keyframe whose surroundings are searched first; -1: no
-   such hint. The frames that follow are tracked as if this one had not been looked for.
-   Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_CAMERA, TV_ERR_STRIDE, TV_ERR_OVERLAP. */
-TV_API tv_status tv_odometry_locate(tv_odometry *odometry, const tv_image *image, int32_t near_id,
+   image, mask: as of tv_odometry_frame; a null mask leaves nothing out. near_id: the id of a
+   keyframe whose surroundings are searched first; -1: no such hint. state: as for
+   tv_odometry_track; its status is TV_ODOMETRY_TRACKING, TV_ODOMETRY_WEAK or TV_ODOMETRY_LOST, and
+   its scale that of the segment which is tracked. The frames that follow are tracked as if this one
+   had not been looked for.
+   Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_CAMERA, TV_ERR_STRIDE, TV_ERR_MASK,
+   TV_ERR_OVERLAP. */
+TV_API tv_status tv_odometry_locate(tv_odometry *odometry, const tv_image *image,
+                                    const tv_image *mask, int32_t near_id,
                                     tv_odometry_state *state);
-
-/* As tv_odometry_locate, of a frame that a mask leaves parts of out.
-   mask: null, or as tv_odometry_frame.mask. Returns TV_ERR_MASK, too. */
-TV_API tv_status tv_odometry_locate_masked(tv_odometry *odometry, const tv_image *image,
-                                           const tv_image *mask, int32_t near_id,
-                                           tv_odometry_state *state);
 
 /* Writes the pose world_from_cam of a frame in the last state of the map, from what
    tv_odometry_state said of the frame when it was tracked: reference_id, reference_from_cam_R and

@@ -53,18 +53,23 @@ TV_API void tv_room_options_init_sized(tv_room_options *options, size_t struct_s
 /* Writes the default options; null is allowed. */
 #define tv_room_options_init(options) tv_room_options_init_sized((options), sizeof *(options))
 
-/* The distance of what each pixel of an image shows. Filled by tv_depth_map_init with zeros, and
-   then by the caller; its arrays are read during a call only, row by row, `stride` elements apart.
-   The image may be a reduced one: the camera that goes with the map is then the reduced one, too
-   (tv_camera_scale). */
+/* The distance of what each pixel of an image shows, with the image's camera and pose. Filled by
+   tv_depth_map_init with zeros, and then by the caller; what it points to is read during a call
+   only, its arrays row by row, `stride` elements apart. The image may be a reduced one: its camera
+   is then the reduced one, too (tv_camera_scale). */
 typedef struct tv_depth_map {
   /* The caller's sizeof, set by tv_depth_map_init. */
   uint32_t struct_size;
-  /* Width and height in pixels, [1, 16384]: those of the camera. */
+  /* Width and height in pixels, [1, 16384]: those of the camera (else TV_ERR_CAMERA). */
   int32_t width, height;
   /* Elements from the start of a row to the start of the next one, in `distance`, `sigma` and
      `witnesses`; at least `width`. */
   int32_t stride;
+  /* The camera, of any model. */
+  const tv_camera *camera;
+  /* The pose: x_world = R x_cam + t. R is a row-major 3x3 rotation to within 1e-6; the unit of t is
+     that of the room. */
+  double world_from_cam_R[9], world_from_cam_t[3];
   /* The distance from the camera's centre along the pixel's ray, in the unit of the poses. Where it
      is unknown: 0, or any number that is not finite or not above 0. (From a depth z along the
      optical axis: z over the third component of the pixel's unit ray.) */
@@ -102,16 +107,14 @@ TV_API void tv_depth_map_init_sized(tv_depth_map *map, size_t struct_size);
 /* Makes an empty room in `memory`, which starts at a multiple of TV_CONTEXT_ALIGNMENT, has at least
    TV_ROOM_MIN_BYTES, and is the room's until the caller uses it for something else; nothing else
    has to be freed. How many blocks the room can hold follows from size_bytes: 1.1 KB each.
-   options: null means the defaults. *room is in `memory`.
+   room: receives a pointer to it. options: null means the defaults.
    Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (an option), TV_ERR_NOT_FINITE (an
    option), TV_ERR_ALIGNMENT, TV_ERR_MEMORY. */
-TV_API tv_status tv_room_init(const tv_room_options *options, void *memory, size_t size_bytes,
-                              tv_room **room);
+TV_API tv_status tv_room_init(tv_room **room, const tv_room_options *options, void *memory,
+                              size_t size_bytes);
 
 /* Fuses a depth map.
-   camera: of the map's width and height (else TV_ERR_CAMERA), any model.
-   R, t: world_from_cam, that is x_world = R x_cam + t. R is a row-major 3x3 rotation to within
-   1e-6.
+   map: initialised by tv_depth_map_init; with its camera, its pose and its distances.
    Where the room has no memory left for the blocks that the map needs, TV_ERR_CAPACITY is returned
    and the room is as it was before; it can go on with a coarser voxel (tv_room_coarsen).
    The weight of a pixel is 16 (voxel / sigma)^2, rounded, at most 64; pixels of weight 0 are
@@ -124,18 +127,16 @@ TV_API tv_status tv_room_init(const tv_room_options *options, void *memory, size
    a desktop core.
    Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (the map or R), TV_ERR_NOT_FINITE (R or
    t), TV_ERR_CAMERA, TV_ERR_CAPACITY, TV_ERR_LIMITS (the room holds TV_ROOM_MAX_MAPS maps). */
-TV_API tv_status tv_room_add(tv_room *room, const tv_camera *camera, const double R[9],
-                             const double t[3], const tv_depth_map *map);
+TV_API tv_status tv_room_add(tv_room *room, const tv_depth_map *map);
 
-/* Removes a map that was added with the same camera, pose R and t, and contents: the sums are then
-   those of a room to which it was never added, bit for bit. TV_ERR_ARGUMENT where the room holds no
-   map of these arguments: none was added, it was removed already, or tv_room_coarsen has fixed it.
-   How many maps saw through a voxel is counted since its block was made: where a removal leaves no
-   surface in a block, the block is freed with these counts. Takes the time of tv_room_add.
-   Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (the map or R, or no such map),
-   TV_ERR_NOT_FINITE (R or t), TV_ERR_CAMERA. */
-TV_API tv_status tv_room_remove(tv_room *room, const tv_camera *camera, const double R[9],
-                                const double t[3], const tv_depth_map *map);
+/* Removes a map that was added with the same camera, pose and contents: the sums are then those of
+   a room to which it was never added, bit for bit. TV_ERR_ARGUMENT where the room holds no such
+   map: none was added, it was removed already, or tv_room_coarsen has fixed it. How many maps saw
+   through a voxel is counted since its block was made: where a removal leaves no surface in a
+   block, the block is freed with these counts. Takes the time of tv_room_add. Returns TV_ERR_NULL,
+   TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (the map or R, or no such map), TV_ERR_NOT_FINITE (R or t),
+   TV_ERR_CAMERA. */
+TV_API tv_status tv_room_remove(tv_room *room, const tv_depth_map *map);
 
 /* Doubles the voxel, which leaves about three quarters of the memory free. The surface is as it
    was, but for the coarser voxel. The maps that are in the room stay in it for ever: tv_room_remove
@@ -144,12 +145,11 @@ TV_API tv_status tv_room_coarsen(tv_room *room);
 
 /* Lets a map that the room holds see through the blocks that were made since it was added, as if it
    were added after them. What was inferred has to stand up to this: call it for each map after the
-   inferred ones were added. The map is named by the camera, the pose R and t, and the contents with
-   which it was added. Takes the time of tv_room_add at most.
+   inferred ones were added. The map has the camera, the pose and the contents with which it was
+   added. Takes the time of tv_room_add at most.
    Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (the map or R, or the room holds no such
    map), TV_ERR_NOT_FINITE (R or t), TV_ERR_CAMERA. */
-TV_API tv_status tv_room_see_through(tv_room *room, const tv_camera *camera, const double R[9],
-                                     const double t[3], const tv_depth_map *map);
+TV_API tv_status tv_room_see_through(tv_room *room, const tv_depth_map *map);
 
 /* What is in a room. */
 typedef struct tv_room_state {
@@ -271,7 +271,7 @@ TV_API void tv_room_mesh_options_init_sized(tv_room_mesh_options *options, size_
    triangles around each edge between two voxels that it crosses. Vertices are not repeated, each is
    of a triangle, and the mesh is closed except where what lies beside was not seen.
    options: null means the defaults.
-   vertices, triangles: room for cap_vertices and cap_triangles; they overlap nothing else.
+   vertices, triangles: room for cap_vertices and for cap_triangles; they overlap nothing else.
    *num_vertices, *num_triangles: how many were written. Where that is too little, TV_ERR_CAPACITY
    is returned, the arrays hold nothing of use, and the counts are those that are enough: calling
    with capacities of 0 (and null arrays) asks for them.
@@ -281,9 +281,9 @@ TV_API void tv_room_mesh_options_init_sized(tv_room_mesh_options *options, size_
    Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (an option, a capacity below 0),
    TV_ERR_NOT_FINITE (an option or a plane), TV_ERR_CAPACITY, TV_ERR_OVERLAP. */
 TV_API tv_status tv_room_mesh(tv_room *room, const tv_room_mesh_options *options,
-                              tv_room_vertex *vertices, int32_t cap_vertices,
+                              tv_room_vertex *vertices, int32_t cap_vertices, int32_t *num_vertices,
                               tv_room_triangle *triangles, int32_t cap_triangles,
-                              int32_t *num_vertices, int32_t *num_triangles);
+                              int32_t *num_triangles);
 
 /* Options of tv_room_find_planes. Filled by tv_room_plane_options_init. */
 typedef struct tv_room_plane_options {
@@ -328,6 +328,13 @@ typedef struct tv_room_infer_options {
   /* The largest difference between neighbours, in grey levels of the picture smoothed by 3 x 3
      pixels, that counts as no texture, [0, 255], default 3. */
   int32_t max_step;
+  /* num_planes of tv_room_find_planes, which are carried; null (default): none. They are read
+     during the call only. */
+  const tv_room_plane *planes;
+  /* [0, TV_ROOM_MAX_PLANES], default 0. */
+  int32_t num_planes;
+  /* Must be 0. */
+  int32_t reserved;
 } tv_room_infer_options;
 
 /* Writes the default options into a struct of struct_size bytes; null is allowed. Programs call
@@ -346,24 +353,22 @@ TV_API tv_status tv_room_infer_size(int32_t width, int32_t height, size_t *size_
    nothing farther away. A region ends where the map's mask is 0, and where the camera has no ray.
    Where several planes qualify, the nearest along the ray is seen. Where the room has a measured
    surface, where a map saw through, and beyond a plane of a share_behind below 0.03, nothing is
-   inferred. room, camera, R, t, map: as for tv_room_add; the map needs `pixels` and was measured
-   (TV_ERR_ARGUMENT). planes: num_planes of tv_room_find_planes.
-   options: null means the defaults. memory: starts at a multiple of TV_CONTEXT_ALIGNMENT and has at
-   least the bytes of tv_room_infer_size; free for other use after the call.
+   inferred.
+   memory: starts at a multiple of TV_CONTEXT_ALIGNMENT and has at least the bytes of
+   tv_room_infer_size. Its contents before and after the call do not matter.
+   map: as for tv_room_add; it needs `pixels` and was measured (TV_ERR_ARGUMENT).
+   options: with the planes; null, and without planes, nothing is inferred.
    distance, sigma: room for width x height each, row by row without gaps; 0 where nothing was
    inferred. *num_pixels: how many pixels were. They are the arrays of another map of the same
    camera and pose, whose `inferred` is 1: add it, and call tv_room_see_through for the measured
    ones, which may contradict it.
    Takes pixels x planes steps at most. The room is only read.
-   Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (the map, R, an option, num_planes),
+   Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (the map, R, an option),
    TV_ERR_NOT_FINITE (R, t or a plane), TV_ERR_CAMERA, TV_ERR_ALIGNMENT, TV_ERR_MEMORY,
    TV_ERR_OVERLAP. */
-TV_API tv_status tv_room_infer(const tv_room *room, const tv_camera *camera, const double R[9],
-                               const double t[3], const tv_depth_map *map,
-                               const tv_room_plane *planes, int32_t num_planes,
-                               const tv_room_infer_options *options, void *memory,
-                               size_t size_bytes, float *distance, float *sigma,
-                               int32_t *num_pixels);
+TV_API tv_status tv_room_infer(const tv_room *room, void *memory, size_t size_bytes,
+                               const tv_depth_map *map, const tv_room_infer_options *options,
+                               float *distance, float *sigma, int32_t *num_pixels);
 
 TV_END_DECLS
 

@@ -82,7 +82,7 @@ typedef enum tv_status {
      (tv_odometry_track, tv_odometry_locate). */
   TV_ERR_STRIDE = 15,
   /* The mask of a frame is not of its image's size, or its stride does not fit its width
-     (tv_odometry_track, tv_odometry_locate_masked). */
+     (tv_odometry_track, tv_odometry_locate). */
   TV_ERR_MASK = 16,
   /* effort or max_effort of the options is above max_effort of the limits that the context was made
      with (tv_reconstruct). */
@@ -93,7 +93,7 @@ typedef enum tv_status {
    is constant and never freed. Thread-safe. */
 TV_API const char *tv_status_string(tv_status status);
 
-/* Returns the version of the library that is linked, such as "0.1.0". It can differ from
+/* Returns the version of the library that is linked, such as "0.2.0". It can differ from
    TV_VERSION_STRING, which is the version of the headers that the program was compiled with. The
    string is constant and never freed. Thread-safe. */
 TV_API const char *tv_version_string(void);

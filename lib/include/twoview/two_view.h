@@ -16,7 +16,7 @@ TV_BEGIN_DECLS
 typedef struct tv_pixel_pairs {
   /* The caller's sizeof, set by tv_pixel_pairs_init. */
   uint32_t struct_size;
-  /* How many pairs there are, [0, the context's max_matches]. */
+  /* How many pairs there are, at least 0; for a call with a context at most its max_matches. */
   int32_t num;
   /* num x 2 (x, y) each, in pixels, distorted as in the images. */
   const double *pixels0, *pixels1;
@@ -271,7 +271,7 @@ typedef struct tv_two_view {
   uint64_t seed;
   /* What the estimate adds to (cx, cy) of both cameras, in pixels: (0, 0) unless
      principal_point_sigma is above 0. All of the result refers to the cameras with it, which
-     tv_corrected_camera computes. */
+     tv_corrected_pair computes. */
   double principal_point_shift[2];
   /* Evidence against (cx, cy) as they were given, whatever principal_point_sigma is: chi-square
      with two degrees of freedom where they are right, so that it exceeds 13.8 in one pair of a
@@ -312,7 +312,7 @@ typedef struct tv_two_view {
   int32_t num_still;
   /* The factor, without a unit, by which the estimate multiplies fx and fy of both cameras, where
      the focal length was refined with the pose (focal_sigma0): all of the result refers to the
-     cameras with it, which tv_corrected_camera computes. 0 where the focal length is as given. */
+     cameras with it, which tv_corrected_pair computes. 0 where the focal length is as given. */
   double focal_scale;
   /* The relative standard deviation of the focal length (of camera0's, where the cameras differ)
      that the covariance contains: what the matches leave of focal_sigma0 where it was refined, else
@@ -339,13 +339,15 @@ TV_API void tv_two_view_init_sized(tv_two_view *result, size_t struct_size);
 /* Writes zeros, and struct_size; null is allowed. */
 #define tv_two_view_init(result) tv_two_view_init_sized((result), sizeof *(result))
 
-/* Writes to `corrected` the camera that the result refers to: `camera` with the result's
-   principal_point_shift added to cx and cy, and with fx and fy multiplied by its focal_scale where
-   that is above 0. Use it for what follows the estimate: triangulation,
-   guided matching and bundle adjustment. `corrected` may be `camera` itself.
+/* Writes to *pair the cameras and the motion that the result refers to, for what follows the
+   estimate: triangulation, guided matching, bundle adjustment and the dense cloud. Each camera is
+   the given one with the result's principal_point_shift added to cx and cy, and with fx and fy
+   multiplied by its focal_scale where that is above 0. The motion is R and t of the result: zeros
+   where it has none (has_R, has_t), which the functions that need a motion refuse.
+   camera0, camera1: those of the estimate. They may be members of *pair.
    Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE. Thread-safe. */
-TV_API tv_status tv_corrected_camera(const tv_two_view *result, const tv_camera *camera,
-                                     tv_camera *corrected);
+TV_API tv_status tv_corrected_pair(const tv_two_view *result, const tv_camera *camera0,
+                                   const tv_camera *camera1, tv_camera_pair *pair);
 
 /* Estimates the two-view geometry of matched pixels.
    camera0, camera1: both cameras; or both null, which gives F and H only and requires the solver

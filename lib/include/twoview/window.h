@@ -223,6 +223,7 @@ TV_API tv_status tv_adjust_window_size(const tv_window *window, size_t *size_byt
    priors alone, the damping of the steps keeps them near the start.
    memory: at least as many bytes as tv_adjust_window_size reports, at a multiple of
    TV_CONTEXT_ALIGNMENT. Its contents before and after the call do not matter.
+   window: what is adjusted, initialised by tv_window_init.
    options: null means the defaults.
    covariances: null, or room for num_views x 36, a row-major 6x6 for each view in the parameters
    (w, v) with x_true = exp([w]x) x + v for a point x in the frame of the camera, in radians and
@@ -241,8 +242,8 @@ TV_API tv_status tv_adjust_window_size(const tv_window *window, size_t *size_byt
    TV_ERR_ALIGNMENT, TV_ERR_MEMORY.
    Time: at most max_iterations steps, each at most in proportion to observations x views, plus
    views^3. Needs no context. Thread-safe: the memory is the only state. */
-TV_API tv_status tv_adjust_window(const tv_window *window, const tv_window_options *options,
-                                  void *memory, size_t size_bytes, double *covariances,
+TV_API tv_status tv_adjust_window(void *memory, size_t size_bytes, const tv_window *window,
+                                  const tv_window_options *options, double *covariances,
                                   float *errors_px, tv_window_result *result);
 
 TV_END_DECLS

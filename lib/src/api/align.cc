@@ -15,7 +15,7 @@ bool is_at_same_place(const tv_keypoint& a, const tv_keypoint& b) {
 // A corner with two directions has two keypoints in turn, and two corners may have two matches,
 // which are one to the estimate: the match of lower rank is aligned, and the other one moves with
 // it.
-void align_all(const tvk_set& set, const tv_image* const images[2], double size_of_one,
+void align_all(const tvk_set& set, const tv_image images[2], double size_of_one,
                tv_keypoint* const keypoints[2], const tv_correspondence* matches,
                int32_t num_matches, uint8_t* aligned) {
   for (int32_t k = 0; k < num_matches; ++k) {
@@ -31,7 +31,7 @@ void align_all(const tvk_set& set, const tv_image* const images[2], double size_
     }
     tv_keypoint& a = keypoints[0][m->idx0];
     tv_keypoint& b = keypoints[1][m->idx1];
-    aligned[k] = align_keypoints(set, *images[0], *images[1], size_of_one, &a, &b);
+    aligned[k] = align_keypoints(set, images[0], images[1], size_of_one, &a, &b);
     if (other == nullptr) continue;
     aligned[k - 1] = aligned[k];
     for (int v = 0; v < 2; ++v) {
@@ -46,15 +46,13 @@ void align_all(const tvk_set& set, const tv_image* const images[2], double size_
 }  // namespace
 }  // namespace tv
 
-tv_status tv_align_matches(tv_context* context, const tv_image* image0, const tv_image* image1,
-                           float size_of_one, tv_keypoint* keypoints0, int32_t num_keypoints0,
-                           tv_keypoint* keypoints1, int32_t num_keypoints1,
-                           const tv_correspondence* matches, int32_t num_matches,
+tv_status tv_align_matches(tv_context* context, const tv_image images[2],
+                           const tv_correspondence* matches, int32_t num_matches, float size_of_one,
+                           tv_keypoint* const keypoints[2], const int32_t num_keypoints[2],
                            uint8_t* aligned) {
-  if (context == nullptr) return TV_ERR_NULL;
-  const tv_image* const images[2] = {image0, image1};
-  tv_keypoint* const keypoints[2] = {keypoints0, keypoints1};
-  const int32_t num_keypoints[2] = {num_keypoints0, num_keypoints1};
+  if (context == nullptr || images == nullptr || keypoints == nullptr || num_keypoints == nullptr) {
+    return TV_ERR_NULL;
+  }
   if (num_matches > 0 && (matches == nullptr || aligned == nullptr)) return TV_ERR_NULL;
   if (!tv::is_finite(size_of_one)) return TV_ERR_NOT_FINITE;
   if (num_matches < 0 || !(size_of_one > 0) || size_of_one > tv::kMaxKeypointSize) {
@@ -62,21 +60,21 @@ tv_status tv_align_matches(tv_context* context, const tv_image* image0, const tv
   }
   tv::Bytes arrays[6];
   for (int v = 0; v < 2; ++v) {
-    tv_status status = tv::check_image(*context, images[v]);
+    tv_status status = tv::check_image(*context, &images[v]);
     if (status != TV_OK) return status;
     if (keypoints[v] == nullptr && num_keypoints[v] > 0) return TV_ERR_NULL;
     if (num_keypoints[v] < 0) return TV_ERR_ARGUMENT;
     status = tv::check_keypoints(keypoints[v], num_keypoints[v]);
     if (status != TV_OK) return status;
     arrays[v] = {keypoints[v], static_cast<size_t>(num_keypoints[v]) * sizeof(tv_keypoint)};
-    arrays[3 + v] = {images[v]->data, tv::image_bytes(*images[v])};
+    arrays[3 + v] = {images[v].data, tv::image_bytes(images[v])};
   }
   arrays[2] = {aligned, static_cast<size_t>(num_matches)};
   arrays[5] = {matches, static_cast<size_t>(num_matches) * sizeof(tv_correspondence)};
   if (tv::outputs_overlap(arrays, 3, 6)) return TV_ERR_OVERLAP;
   for (int32_t k = 0; k < num_matches; ++k) {
-    if (static_cast<uint32_t>(matches[k].idx0) >= static_cast<uint32_t>(num_keypoints0) ||
-        static_cast<uint32_t>(matches[k].idx1) >= static_cast<uint32_t>(num_keypoints1)) {
+    if (static_cast<uint32_t>(matches[k].idx0) >= static_cast<uint32_t>(num_keypoints[0]) ||
+        static_cast<uint32_t>(matches[k].idx1) >= static_cast<uint32_t>(num_keypoints[1])) {
       return TV_ERR_ARGUMENT;
     }
   }

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <cstring>
 
+#include "api/camera_pair.h"
 #include "api/sized.h"
 #include "api/validate.h"
-#include "geometry/essential.h"
 #include "robust/bundle.h"
 #include "robust/point_covariance.h"
 
@@ -29,19 +29,18 @@ tv_status read_bundle_options(const tv_bundle_options* options, tv_bundle_option
   return valid ? TV_OK : TV_ERR_ARGUMENT;
 }
 
-// Checks a pose. Writes it with t of unit length, and |t| to *baseline.
-tv_status read_pose(const double R[9], const double t[3], Pose* pose, double* baseline) {
-  if (!all_finite(R, 9) || !all_finite(t, 3)) return TV_ERR_NOT_FINITE;
-  if (!is_rotation(R)) return TV_ERR_ARGUMENT;
+// Reads the motion of a pair, which check_pair has checked, with t of unit length, and |t| to
+// *baseline, which must be a number.
+tv_status read_motion(const tv_camera_pair& pair, Pose* pose, double* baseline) {
+  const double* const t = pair.cam1_from_cam0_t;
   double largest = 0.0;
   for (int i = 0; i < 3; ++i) largest = std::fabs(t[i]) > largest ? std::fabs(t[i]) : largest;
-  if (largest == 0.0) return TV_ERR_ARGUMENT;
   const double x = t[0] / largest, y = t[1] / largest, z = t[2] / largest;
   const double length = std::sqrt(x * x + y * y + z * z);
   *baseline = largest * length;
   if (!is_finite(*baseline)) return TV_ERR_ARGUMENT;
   pose->t = Vec3(x / length, y / length, z / length);
-  for (int i = 0; i < 9; ++i) pose->R(i / 3, i % 3) = R[i];
+  for (int i = 0; i < 9; ++i) pose->R(i / 3, i % 3) = pair.cam1_from_cam0_R[i];
   return TV_OK;
 }
 
@@ -77,90 +76,77 @@ void tv_bundle_result_init_sized(tv_bundle_result* result, size_t struct_size) {
   tv::init_zeros(result, struct_size);
 }
 
-tv_status tv_adjust_two_view(tv_context* context, const tv_camera* camera0,
-                             const tv_camera* camera1, const tv_pixel_pairs* pairs,
-                             const tv_bundle_options* options, double R[9], double t[3],
+tv_status tv_adjust_two_view(tv_context* context, const tv_pixel_pairs* pixels,
+                             const tv_bundle_options* options, tv_camera_pair* pair,
                              tv_point* points, tv_bundle_result* result) {
-  if (context == nullptr || camera0 == nullptr || camera1 == nullptr || R == nullptr ||
-      t == nullptr) {
-    return TV_ERR_NULL;
-  }
+  if (context == nullptr || pair == nullptr) return TV_ERR_NULL;
   tv_pixel_pairs matches;
-  tv_status status = tv::read_pixel_pairs(pairs, &matches);
+  tv_status status = tv::read_pixel_pairs(pixels, &matches);
   if (status == TV_OK && result != nullptr) status = tv::check_sized(result);
   if (status != TV_OK) return status;
-  const double *const pixels0 = matches.pixels0, *const pixels1 = matches.pixels1;
-  const int32_t num_points = matches.num;
-  if (num_points > 0 && points == nullptr) return TV_ERR_NULL;
+  if (matches.num > 0 && points == nullptr) return TV_ERR_NULL;
   tv::BundleProblem problem{};
   status = tv::read_bundle_options(options, &problem.options);
   if (status != TV_OK) return status;
-  if (num_points > context->limits.max_matches || !tv::made_for(*context, TV_PURPOSE_ADJUST)) {
+  if (matches.num > context->limits.max_matches || !tv::made_for(*context, TV_PURPOSE_ADJUST)) {
     return TV_ERR_LIMITS;
   }
-  if (tv_camera_check(camera0) != TV_OK || tv_camera_check(camera1) != TV_OK) return TV_ERR_CAMERA;
+  status = tv::check_pair(*pair);
   tv::Pose pose;
   double baseline;
-  status = tv::read_pose(R, t, &pose, &baseline);
+  if (status == TV_OK) status = tv::read_motion(*pair, &pose, &baseline);
   if (status != TV_OK) return status;
-  const size_t n = static_cast<size_t>(num_points);
-  const tv::Bytes arrays[12] = {{points, n * sizeof(tv_point)},
-                                {R, 9 * sizeof(double)},
-                                {t, 3 * sizeof(double)},
-                                {result, result != nullptr ? result->struct_size : 0},
-                                {pixels0, 2 * n * sizeof(double)},
-                                {pixels1, 2 * n * sizeof(double)},
-                                {camera0, sizeof(tv_camera)},
-                                {camera1, sizeof(tv_camera)},
-                                {options, options != nullptr ? options->struct_size : 0},
-                                {pairs, pairs->struct_size},
-                                {matches.sigmas0, n * sizeof(float)},
-                                {matches.sigmas1, n * sizeof(float)}};
-  if (tv::outputs_overlap(arrays, 4, 12)) return TV_ERR_OVERLAP;
+  const size_t n = static_cast<size_t>(matches.num);
+  const tv::Bytes arrays[9] = {{points, n * sizeof(tv_point)},
+                               {pair, sizeof *pair},
+                               {result, result != nullptr ? result->struct_size : 0},
+                               {matches.pixels0, 2 * n * sizeof(double)},
+                               {matches.pixels1, 2 * n * sizeof(double)},
+                               {options, options != nullptr ? options->struct_size : 0},
+                               {pixels, pixels->struct_size},
+                               {matches.sigmas0, n * sizeof(float)},
+                               {matches.sigmas1, n * sizeof(float)}};
+  if (tv::outputs_overlap(arrays, 3, 9)) return TV_ERR_OVERLAP;
   tv::StageTimer timer(context, TV_STAGE_REFINE);
-  problem.camera[0] = tv::prepare_camera(*camera0);
-  problem.camera[1] = tv::prepare_camera(*camera1);
-  problem.pixels[0] = pixels0;
-  problem.pixels[1] = pixels1;
+  problem.camera[0] = tv::prepare_camera(pair->camera0);
+  problem.camera[1] = tv::prepare_camera(pair->camera1);
+  problem.pixels[0] = matches.pixels0;
+  problem.pixels[1] = matches.pixels1;
   problem.sigmas[0] = matches.sigmas0;
   problem.sigmas[1] = matches.sigmas1;
-  problem.num = num_points;
+  problem.num = matches.num;
   tv::BundleOutcome outcome;
   tv::adjust_two_view(problem, pose, baseline, context->arena, points, &outcome);
   if (outcome.moved) {  // if the pose has not changed, R and t keep their bits
-    for (int i = 0; i < 9; ++i) R[i] = outcome.pose.R(i / 3, i % 3);
-    for (int i = 0; i < 3; ++i) t[i] = baseline * outcome.pose.t[i];
+    for (int i = 0; i < 9; ++i) pair->cam1_from_cam0_R[i] = outcome.pose.R(i / 3, i % 3);
+    for (int i = 0; i < 3; ++i) pair->cam1_from_cam0_t[i] = baseline * outcome.pose.t[i];
   }
   if (result != nullptr) tv::pack(outcome, result);
   return TV_OK;
 }
 
-tv_status tv_point_covariances(const tv_camera* camera0, const tv_camera* camera1,
-                               const double R[9], const double t[3], const double* pose_covariance,
-                               double noise_px, const tv_point* points, int32_t num_points,
+tv_status tv_point_covariances(const tv_camera_pair* pair, const tv_point* points,
+                               int32_t num_points, double noise_px, const double* pose_covariance,
                                double* covariances) {
-  if (camera0 == nullptr || camera1 == nullptr || R == nullptr || t == nullptr ||
-      (num_points > 0 && (points == nullptr || covariances == nullptr))) {
+  if (pair == nullptr || (num_points > 0 && (points == nullptr || covariances == nullptr))) {
     return TV_ERR_NULL;
   }
   if (!tv::is_finite(noise_px)) return TV_ERR_NOT_FINITE;
   if (pose_covariance != nullptr && !tv::all_finite(pose_covariance, 25)) return TV_ERR_NOT_FINITE;
   if (num_points < 0 || noise_px < 0 || noise_px > tv::kLargest) return TV_ERR_ARGUMENT;
-  if (tv_camera_check(camera0) != TV_OK || tv_camera_check(camera1) != TV_OK) return TV_ERR_CAMERA;
+  tv_status status = tv::check_pair(*pair);
   tv::Pose pose;
   double baseline;
-  const tv_status status = tv::read_pose(R, t, &pose, &baseline);
+  if (status == TV_OK) status = tv::read_motion(*pair, &pose, &baseline);
   if (status != TV_OK) return status;
   const size_t n = static_cast<size_t>(num_points);
-  const tv::Bytes arrays[7] = {{covariances, 9 * n * sizeof(double)},
+  const tv::Bytes arrays[4] = {{covariances, 9 * n * sizeof(double)},
                                {points, n * sizeof(tv_point)},
                                {pose_covariance, 25 * sizeof(double)},
-                               {R, 9 * sizeof(double)},
-                               {t, 3 * sizeof(double)},
-                               {camera0, sizeof(tv_camera)},
-                               {camera1, sizeof(tv_camera)}};
-  if (tv::outputs_overlap(arrays, 1, 7)) return TV_ERR_OVERLAP;
-  const tv::Camera cameras[2] = {tv::prepare_camera(*camera0), tv::prepare_camera(*camera1)};
+                               {pair, sizeof *pair}};
+  if (tv::outputs_overlap(arrays, 1, 4)) return TV_ERR_OVERLAP;
+  const tv::Camera cameras[2] = {tv::prepare_camera(pair->camera0),
+                                 tv::prepare_camera(pair->camera1)};
   const tv::BundleFrame frame = tv::bundle_frame(pose);
   for (size_t i = 0; i < n; ++i) {
     tv::point_covariance(cameras, frame, baseline, pose_covariance, noise_px, points[i],

@@ -4,17 +4,18 @@
 #include <algorithm>
 #include <cmath>
 
+#include "api/camera_pair.h"
 #include "api/sized.h"
 #include "api/validate.h"
 #include "api/within.h"
 #include "dense/pair.h"
-#include "geometry/essential.h"
 
 namespace tv {
 namespace {
 
 constexpr int32_t kMaxSide = 16384;
-constexpr tv_dense_options kDefaults = {sizeof(tv_dense_options), 400000, 256, 0, 0.0, 0.0, 0.05};
+constexpr tv_dense_options kDefaults = {
+    sizeof(tv_dense_options), 400000, 256, 0, nullptr, 0.0, 0.0, 0.05};
 
 tv_status read_options(const tv_dense_options* given, tv_dense_options* options) {
   *options = kDefaults;
@@ -24,9 +25,10 @@ tv_status read_options(const tv_dense_options* given, tv_dense_options* options)
       !is_finite(options->max_relative_sigma)) {
     return TV_ERR_NOT_FINITE;
   }
+  if (options->sparse == nullptr && options->num_sparse > 0) return TV_ERR_NULL;
   const bool valid =
       within(options->max_cells, 1024, 1 << 24) && within(options->max_steps, 16, 512) &&
-      options->reserved == 0 && options->min_parallax_rad >= 0 &&
+      options->num_sparse >= 0 && options->min_parallax_rad >= 0 &&
       options->max_parallax_rad <= kPi &&
       (options->max_parallax_rad == 0 || options->max_parallax_rad > options->min_parallax_rad) &&
       options->max_relative_sigma > 0 && options->max_relative_sigma <= 1;
@@ -65,50 +67,52 @@ tv_status tv_dense_size(const tv_camera* camera0, const tv_camera* camera1,
   return status;
 }
 
-tv_status tv_densify(const tv_image* image0, const tv_image* image1, const tv_camera* camera0,
-                     const tv_camera* camera1, const double R[9], const double t[3],
-                     const tv_point* sparse, int32_t num_sparse, const tv_dense_options* options,
-                     void* memory, size_t size_bytes, tv_dense_point* points, int32_t cap_points,
-                     int32_t* num_points) {
-  if (image0 == nullptr || image1 == nullptr || camera0 == nullptr || camera1 == nullptr ||
-      R == nullptr || t == nullptr || memory == nullptr || num_points == nullptr ||
-      (sparse == nullptr && num_sparse > 0) || (points == nullptr && cap_points > 0)) {
+tv_status tv_densify(void* memory, size_t size_bytes, const tv_camera_pair* pair,
+                     const tv_image images[2], const tv_dense_options* options,
+                     tv_dense_point* points, int32_t cap_points, int32_t* num_points) {
+  if (memory == nullptr || pair == nullptr || images == nullptr || num_points == nullptr ||
+      (points == nullptr && cap_points > 0)) {
     return TV_ERR_NULL;
   }
+  const tv_camera &camera0 = pair->camera0, &camera1 = pair->camera1;
   tv_dense_options checked;
   tv_status status = tv::read_options(options, &checked);
-  if (status == TV_OK) status = tv::check_cameras(camera0, camera1);
+  if (status == TV_OK) status = tv::check_cameras(&camera0, &camera1);
   if (status != TV_OK) return status;
-  if (num_sparse < 0 || cap_points < 0) return TV_ERR_ARGUMENT;
-  status = tv::check_camera_image(*camera0, *image0);
-  if (status == TV_OK) status = tv::check_camera_image(*camera1, *image1);
+  if (cap_points < 0) return TV_ERR_ARGUMENT;
+  status = tv::check_camera_image(camera0, images[0]);
+  if (status == TV_OK) status = tv::check_camera_image(camera1, images[1]);
+  if (status == TV_OK) status = tv::check_pair(*pair);
   if (status != TV_OK) return status;
-  if (!tv::all_finite(R, 9) || !tv::all_finite(t, 3)) return TV_ERR_NOT_FINITE;
-  if (!tv::is_rotation(R) || (t[0] == 0.0 && t[1] == 0.0 && t[2] == 0.0)) return TV_ERR_ARGUMENT;
   if (reinterpret_cast<uintptr_t>(memory) % TV_CONTEXT_ALIGNMENT != 0) return TV_ERR_ALIGNMENT;
   const tv::DenseLimits limits = tv::limits_of(checked);
-  if (size_bytes < tv::match_pair_bytes(*camera0, *camera1, limits)) return TV_ERR_MEMORY;
-  const tv::Bytes arrays[6] = {{points, static_cast<size_t>(cap_points) * sizeof(tv_dense_point)},
+  if (size_bytes < tv::match_pair_bytes(camera0, camera1, limits)) return TV_ERR_MEMORY;
+  const size_t num_sparse = static_cast<size_t>(checked.num_sparse);
+  const tv::Bytes arrays[9] = {{points, static_cast<size_t>(cap_points) * sizeof(tv_dense_point)},
                                {num_points, sizeof *num_points},
                                {memory, size_bytes},
-                               {image0->data, tv::image_bytes(*image0)},
-                               {image1->data, tv::image_bytes(*image1)},
-                               {sparse, static_cast<size_t>(num_sparse) * sizeof(tv_point)}};
-  if (tv::outputs_overlap(arrays, 3, 6)) return TV_ERR_OVERLAP;
+                               {images[0].data, tv::image_bytes(images[0])},
+                               {images[1].data, tv::image_bytes(images[1])},
+                               {checked.sparse, num_sparse * sizeof(tv_point)},
+                               {pair, sizeof *pair},
+                               {images, 2 * sizeof *images},
+                               {options, options != nullptr ? options->struct_size : 0}};
+  if (tv::outputs_overlap(arrays, 3, 9)) return TV_ERR_OVERLAP;
 
   tv::Arena arena = tv::arena_over(memory, size_bytes);
   tv::Mat3 rotation;
-  for (int i = 0; i < 9; ++i) rotation(i / 3, i % 3) = R[i];
-  const tv::ParallaxHint hint{checked.min_parallax_rad, checked.max_parallax_rad, sparse,
-                              num_sparse};
-  tv::DensePair pair;
+  for (int i = 0; i < 9; ++i) rotation(i / 3, i % 3) = pair->cam1_from_cam0_R[i];
+  const double* const t = pair->cam1_from_cam0_t;
+  const tv::ParallaxHint hint{checked.min_parallax_rad, checked.max_parallax_rad, checked.sparse,
+                              checked.num_sparse};
+  tv::DensePair matched;
   *num_points = 0;
-  if (!tv::match_pair(*camera0, *camera1, *image0, *image1, rotation, tv::Vec3(t[0], t[1], t[2]),
-                      hint, limits, arena, &pair)) {
+  if (!tv::match_pair(camera0, camera1, images[0], images[1], rotation, tv::Vec3(t[0], t[1], t[2]),
+                      hint, limits, arena, &matched)) {
     return TV_OK;
   }
-  const tv::DenseGrid& grid = pair.grid;
-  tv::PointMaker maker(pair, arena);
+  const tv::DenseGrid& grid = matched.grid;
+  tv::PointMaker maker(matched, arena);
   if (cap_points > checked.max_cells) cap_points = checked.max_cells;
   // Where there is not room for all cells, those that have a point are counted first, and then as
   // many as there is room for are written. A cell counts as much as it is wide in the image, which
@@ -140,7 +144,7 @@ tv_status tv_densify(const tv_image* image0, const tv_image* image1, const tv_ca
       if (!maker.point(x, &point)) continue;
       const int32_t u = static_cast<int32_t>(point.pixel0[0] + 0.5f);
       const int32_t v = static_cast<int32_t>(point.pixel0[1] + 0.5f);
-      point.grey = image0->data[static_cast<int64_t>(v) * image0->stride_bytes + u];
+      point.grey = images[0].data[static_cast<int64_t>(v) * images[0].stride_bytes + u];
       ++num;
     }
   }

@@ -222,8 +222,8 @@ tv_status tv_depth_size(const tv_camera* reference, const tv_depth_options* opti
   return status;
 }
 
-tv_status tv_sweep_depth(const tv_depth_view* views, int32_t num_views,
-                         const tv_depth_options* options, void* memory, size_t size_bytes,
+tv_status tv_sweep_depth(void* memory, size_t size_bytes, const tv_depth_view* views,
+                         int32_t num_views, const tv_depth_options* options,
                          const tv_depth_arrays* arrays) {
   if (views == nullptr || options == nullptr || memory == nullptr || arrays == nullptr ||
       arrays->distance == nullptr || arrays->sigma == nullptr || arrays->witnesses == nullptr) {

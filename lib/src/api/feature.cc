@@ -146,8 +146,8 @@ tv_status tv_detect(tv_context* context, const tv_image* image, const tv_image* 
   return TV_OK;
 }
 
-tv_status tv_orient(tv_context* context, const tv_image* image, const tv_feature_options* options,
-                    const tv_keypoint* keypoints, int32_t num_keypoints, tv_keypoint* oriented,
+tv_status tv_orient(tv_context* context, const tv_image* image, const tv_keypoint* keypoints,
+                    int32_t num_keypoints, const tv_feature_options* options, tv_keypoint* oriented,
                     int32_t cap_oriented, int32_t* num_oriented) {
   const tv::Request request = tv::check_request(context, image, nullptr, options);
   if (request.status != TV_OK) return request.status;
@@ -175,8 +175,9 @@ tv_status tv_orient(tv_context* context, const tv_image* image, const tv_feature
   return TV_OK;
 }
 
-tv_status tv_describe(tv_context* context, const tv_image* image, const tv_feature_options* options,
-                      const tv_keypoint* keypoints, int32_t num_keypoints, uint8_t* descriptors) {
+tv_status tv_describe(tv_context* context, const tv_image* image, const tv_keypoint* keypoints,
+                      int32_t num_keypoints, const tv_feature_options* options,
+                      uint8_t* descriptors) {
   const tv::Request request = tv::check_request(context, image, nullptr, options);
   if (request.status != TV_OK) return request.status;
   if (num_keypoints < 0) return TV_ERR_ARGUMENT;

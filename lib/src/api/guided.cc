@@ -55,15 +55,16 @@ void tv_guided_options_init_sized(tv_guided_options* options, size_t struct_size
   tv::init_sized(options, struct_size, &tv::kDefaults, sizeof tv::kDefaults);
 }
 
-tv_status tv_match_guided(tv_context* context, const tv_camera* camera0, const tv_camera* camera1,
-                          const double epipolar[9], const tv_features* features0,
-                          const tv_features* features1, const tv_guided_options* options,
-                          tv_correspondence* correspondences, int32_t cap_correspondences,
-                          int32_t* num_correspondences) {
+tv_status tv_match_guided(tv_context* context, const tv_epipolar* epipolar,
+                          const tv_features* features0, const tv_features* features1,
+                          const tv_guided_options* options, tv_correspondence* correspondences,
+                          int32_t cap_correspondences, int32_t* num_correspondences) {
   if (context == nullptr || epipolar == nullptr || num_correspondences == nullptr ||
       (correspondences == nullptr && cap_correspondences > 0)) {
     return TV_ERR_NULL;
   }
+  const tv_camera *const camera0 = epipolar->camera0, *const camera1 = epipolar->camera1;
+  const double* const matrix = epipolar->matrix;
   tv_guided_options checked;
   tv_status status = tv::read_guided_options(options, &checked);
   if (status != TV_OK) return status;
@@ -74,11 +75,11 @@ tv_status tv_match_guided(tv_context* context, const tv_camera* camera0, const t
   // double's range.
   double scaled[9], largest = 0;
   for (int k = 0; k < 9; ++k) {
-    if (!tv::is_finite(epipolar[k])) return TV_ERR_NOT_FINITE;
-    const double size = epipolar[k] < 0 ? -epipolar[k] : epipolar[k];
+    if (!tv::is_finite(matrix[k])) return TV_ERR_NOT_FINITE;
+    const double size = matrix[k] < 0 ? -matrix[k] : matrix[k];
     largest = size > largest ? size : largest;
   }
-  for (int k = 0; k < 9; ++k) scaled[k] = largest > 0 ? epipolar[k] / largest : 0;
+  for (int k = 0; k < 9; ++k) scaled[k] = largest > 0 ? matrix[k] / largest : 0;
   if (camera0 != nullptr) {
     status = tv_camera_check(camera0);
     if (status == TV_OK) status = tv_camera_check(camera1);

@@ -316,14 +316,8 @@ tv_status tv_odometry_finish(tv_odometry* odometry) {
   return TV_OK;
 }
 
-tv_status tv_odometry_locate(tv_odometry* odometry, const tv_image* image, int32_t near_id,
-                             tv_odometry_state* state) {
-  return tv_odometry_locate_masked(odometry, image, nullptr, near_id, state);
-}
-
-tv_status tv_odometry_locate_masked(tv_odometry* odometry, const tv_image* image,
-                                    const tv_image* mask, int32_t near_id,
-                                    tv_odometry_state* state) {
+tv_status tv_odometry_locate(tv_odometry* odometry, const tv_image* image, const tv_image* mask,
+                             int32_t near_id, tv_odometry_state* state) {
   if (odometry == nullptr || image == nullptr || state == nullptr) return TV_ERR_NULL;
   if (mask != nullptr && mask->data == nullptr) mask = nullptr;
   tv_status status = tv::check_sized(state);

@@ -26,7 +26,7 @@
 namespace tv {
 namespace {
 
-// The arrays of one reconstruction, at the front of the arena, and the cameras of its estimate.
+// The arrays of one reconstruction, at the front of the arena.
 struct Results {
   tv_keypoint* keypoints[2];
   uint8_t* descriptors[2];
@@ -42,8 +42,8 @@ struct Results {
   // Of each keypoint of view 0, the byte of tv_align_matches of its match, or 0. It lies where
   // `points` lies, and is valid until there are points.
   uint8_t* aligned;
-  // The cameras of the two views, corrected by the present estimate; set for full poses only.
-  tv_camera cameras[2];
+  // The cameras and the motion of the present estimate; set for full poses only.
+  tv_camera_pair* pair;
   tv_pixel_pairs pairs;  // of the present matches; with sigmas where sigma_by_size is not 0
   float keypoint_size;   // the size of a keypoint whose sigma is 1
   double sigma_by_size;  // the option
@@ -66,6 +66,7 @@ Results alloc_results(Arena& arena, const tv_limits& limits) {
   r.points = arena_alloc<tv_point>(arena, m);
   r.more_matches = arena_alloc<tv_correspondence>(arena, n);
   r.more_inlier_mask = arena_alloc<uint8_t>(arena, m);
+  r.pair = arena_alloc<tv_camera_pair>(arena, 1);
   // A rung has at most 6.5 times max_keypoints, and there are at least max_keypoints points.
   static_assert(sizeof(tv_point) >= 7 * sizeof *r.aligned, "the points' memory is large enough");
   r.aligned = reinterpret_cast<uint8_t*>(r.points);
@@ -147,9 +148,9 @@ __attribute__((noinline)) tv_status align_matches(tv_context* context, const tv_
                                                   const int32_t num_keypoints[2],
                                                   int32_t num_matches, Results& r) {
   uint8_t* const aligned = r.inlier_mask;
-  const tv_status status = tv_align_matches(
-      context, &views[0].image, &views[1].image, r.keypoint_size, r.keypoints[0], num_keypoints[0],
-      r.keypoints[1], num_keypoints[1], r.matches, num_matches, aligned);
+  const tv_image images[2] = {views[0].image, views[1].image};
+  const tv_status status = tv_align_matches(context, images, r.matches, num_matches,
+                                            r.keypoint_size, r.keypoints, num_keypoints, aligned);
   if (status != TV_OK) return status;
   for (int32_t k = 0; k < num_matches; ++k) r.aligned[r.matches[k].idx0] = aligned[k];
   return TV_OK;
@@ -245,13 +246,11 @@ tv_features features_of(const Results& r, const int32_t num_keypoints[2], int vi
 
 bool is_full_pose(const tv_two_view& v) { return v.has_R != 0 && v.has_t != 0; }
 
-// Stores the cameras that an estimate refers to in r, for the stages that follow. Call it for each
-// estimate that is kept.
-void correct_cameras(const tv_two_view& estimate, const tv_view& view0, const tv_view& view1,
-                     Results& r) {
-  if (!is_full_pose(estimate)) return;
-  tv_corrected_camera(&estimate, view0.camera, &r.cameras[0]);
-  tv_corrected_camera(&estimate, view1.camera, &r.cameras[1]);
+// Stores the cameras and the motion of an estimate in r, for the stages that follow. Call it for
+// each estimate that is kept.
+void keep_pair(const tv_two_view& estimate, const tv_view& view0, const tv_view& view1,
+               Results& r) {
+  if (is_full_pose(estimate)) tv_corrected_pair(&estimate, view0.camera, view1.camera, r.pair);
 }
 
 // Writes the guided matches of an estimate to r.more_matches. Not inlined, so that its stack frame
@@ -262,8 +261,10 @@ __attribute__((noinline)) tv_status match_guided(tv_context* context,
                                                  int32_t* count) {
   const tv_features features[2] = {features_of(r, num_keypoints, 0),
                                    features_of(r, num_keypoints, 1)};
-  return tv_match_guided(context, &r.cameras[0], &r.cameras[1], estimate.E, &features[0],
-                         &features[1], nullptr, r.more_matches, context->most_keypoints, count);
+  tv_epipolar epipolar{&r.pair->camera0, &r.pair->camera1, {}};
+  std::copy(estimate.E, estimate.E + 9, epipolar.matrix);
+  return tv_match_guided(context, &epipolar, &features[0], &features[1], nullptr, r.more_matches,
+                         context->most_keypoints, count);
 }
 
 // Matches again along the epipolar lines of the attempt's estimate, and estimates from all matches.
@@ -298,7 +299,7 @@ __attribute__((noinline)) tv_status match_along_lines(tv_context* context, const
     return TV_OK;
   }
   *estimate = again;
-  correct_cameras(again, task.views[0], task.views[1], r);
+  keep_pair(again, task.views[0], task.views[1], r);
   *num_matches = count;
   *num_left_out = left_out;
   std::copy(r.more_matches, r.more_matches + count, r.matches);
@@ -318,9 +319,7 @@ __attribute__((noinline)) tv_status triangulate_inliers(tv_context* context,
   if (num_matches == 0) return TV_OK;
   const bool full_pose = is_full_pose(two_view);
   if (full_pose) {
-    const tv_status status =
-        tv_triangulate(method, &r.cameras[0], &r.cameras[1], two_view.R, two_view.t, r.pixels[0],
-                       r.pixels[1], num_matches, r.points);
+    const tv_status status = tv_triangulate(r.pair, &r.pairs, method, r.points);
     if (status != TV_OK) return status;
   }
   for (int32_t k = 0; k < num_matches; ++k) {
@@ -344,16 +343,18 @@ __attribute__((noinline)) tv_status adjust(tv_context* context, int32_t num_matc
                                            tv_two_view* two_view, int32_t* num_points) {
   tv_bundle_result bundle;
   tv_bundle_result_init(&bundle);
-  const tv_status status = tv_adjust_two_view(context, &r.cameras[0], &r.cameras[1], &r.pairs,
-                                              nullptr, two_view->R, two_view->t, r.points, &bundle);
+  const tv_status status =
+      tv_adjust_two_view(context, &r.pairs, nullptr, r.pair, r.points, &bundle);
   if (status != TV_OK) return status;
+  std::copy(r.pair->cam1_from_cam0_R, r.pair->cam1_from_cam0_R + 9, two_view->R);
+  std::copy(r.pair->cam1_from_cam0_t, r.pair->cam1_from_cam0_t + 3, two_view->t);
   Pose pose;
   for (int k = 0; k < 9; ++k) pose.R(k / 3, k % 3) = two_view->R[k];
   for (int k = 0; k < 3; ++k) pose.t[k] = two_view->t[k];
   const Mat3 E = essential_from_pose(pose);
   store_unit(E, two_view->E);
-  store_unit(inverse_intrinsics(intrinsics_of(r.cameras[1])).transpose() * E *
-                 inverse_intrinsics(intrinsics_of(r.cameras[0])),
+  store_unit(inverse_intrinsics(intrinsics_of(r.pair->camera1)).transpose() * E *
+                 inverse_intrinsics(intrinsics_of(r.pair->camera0)),
              two_view->F);
   two_view->has_covariance = bundle.has_covariance;
   std::copy(bundle.covariance, bundle.covariance + 25, two_view->covariance);
@@ -526,7 +527,7 @@ tv_status run_rung(tv_context* context, const Task& task, Results& r, Attempt* a
   status = estimate_two_view(context, task.views[0].camera, task.views[1].camera, &r.pairs,
                              &task.estimate, &estimate, r.inlier_mask, &attempt->evidence);
   if (status != TV_OK) return status;
-  correct_cameras(estimate, task.views[0], task.views[1], r);
+  keep_pair(estimate, task.views[0], task.views[1], r);
   judge_attempt(context, task, r, attempt);
   return TV_OK;
 }

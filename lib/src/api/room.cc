@@ -24,7 +24,7 @@ constexpr tv_room_mesh_options kMeshDefaults = {
     sizeof(tv_room_mesh_options), 1, 64, 0, {0, 0, 0}, {0, 0, 0}, nullptr, 0, 0, 0};
 constexpr tv_room_plane_options kPlaneDefaults = {
     sizeof(tv_room_plane_options), 0, 0, {0, 0, 0}, 0.02};
-constexpr tv_room_infer_options kInferDefaults = {sizeof(tv_room_infer_options), 3};
+constexpr tv_room_infer_options kInferDefaults = {sizeof(tv_room_infer_options), 3, nullptr, 0, 0};
 constexpr double kLeastArea = 640;  // squares of a voxel's side: 40 sides of a block
 
 tv_status read_options(const tv_room_options* given, tv_room_options* options) {
@@ -65,19 +65,18 @@ tv_status check_map(const tv_depth_map& map, const tv_camera& camera) {
 }
 
 // Checks what tv_room_add and tv_room_remove are given, and makes the view of it.
-tv_status read_view(const tv_room* room, const tv_camera* camera, const double R[9],
-                    const double t[3], const tv_depth_map* map, RoomView* view) {
-  if (room == nullptr || camera == nullptr || R == nullptr || t == nullptr || map == nullptr) {
-    return TV_ERR_NULL;
-  }
+tv_status read_view(const tv_room* room, const tv_depth_map* map, RoomView* view) {
+  if (room == nullptr || map == nullptr) return TV_ERR_NULL;
   view->map = tv_depth_map{};
+  const tv_depth_map& given = view->map;
   tv_status status = read_sized(map, &view->map);
-  if (status == TV_OK) status = tv_camera_check(camera);
-  if (status == TV_OK) status = check_map(view->map, *camera);
+  if (status == TV_OK) status = tv_camera_check(given.camera);
+  if (status == TV_OK) status = check_map(given, *given.camera);
   if (status != TV_OK) return status;
+  const double *const R = given.world_from_cam_R, *const t = given.world_from_cam_t;
   if (!all_finite(R, 9) || !all_finite(t, 3)) return TV_ERR_NOT_FINITE;
   if (!is_rotation(R)) return TV_ERR_ARGUMENT;
-  view->camera = prepare_camera(*camera);
+  view->camera = prepare_camera(*given.camera);
   for (int i = 0; i < 9; ++i) view->rotation(i / 3, i % 3) = R[i];
   for (int i = 0; i < 3; ++i) view->centre[i] = t[i];
   return TV_OK;
@@ -194,8 +193,8 @@ void tv_room_infer_options_init_sized(tv_room_infer_options* options, size_t str
   tv::init_sized(options, struct_size, &tv::kInferDefaults, sizeof tv::kInferDefaults);
 }
 
-tv_status tv_room_init(const tv_room_options* options, void* memory, size_t size_bytes,
-                       tv_room** room) {
+tv_status tv_room_init(tv_room** room, const tv_room_options* options, void* memory,
+                       size_t size_bytes) {
   if (memory == nullptr || room == nullptr) return TV_ERR_NULL;
   tv_room_options checked;
   const tv_status status = tv::read_options(options, &checked);
@@ -206,10 +205,9 @@ tv_status tv_room_init(const tv_room_options* options, void* memory, size_t size
   return TV_OK;
 }
 
-tv_status tv_room_add(tv_room* room, const tv_camera* camera, const double R[9], const double t[3],
-                      const tv_depth_map* map) {
+tv_status tv_room_add(tv_room* room, const tv_depth_map* map) {
   tv::RoomView view;
-  const tv_status status = tv::read_view(room, camera, R, t, map, &view);
+  const tv_status status = tv::read_view(room, map, &view);
   if (status != TV_OK) return status;
   if (room->num_maps == TV_ROOM_MAX_MAPS) return TV_ERR_LIMITS;
   if (!tv::list_near_blocks(*room, view, true)) return TV_ERR_CAPACITY;
@@ -219,10 +217,9 @@ tv_status tv_room_add(tv_room* room, const tv_camera* camera, const double R[9],
   return TV_OK;
 }
 
-tv_status tv_room_remove(tv_room* room, const tv_camera* camera, const double R[9],
-                         const double t[3], const tv_depth_map* map) {
+tv_status tv_room_remove(tv_room* room, const tv_depth_map* map) {
   tv::RoomView view;
-  const tv_status status = tv::read_view(room, camera, R, t, map, &view);
+  const tv_status status = tv::read_view(room, map, &view);
   if (status != TV_OK) return status;
   int32_t k = tv::record_of(*room, view);
   if (k < 0) return TV_ERR_ARGUMENT;
@@ -234,10 +231,9 @@ tv_status tv_room_remove(tv_room* room, const tv_camera* camera, const double R[
   return TV_OK;
 }
 
-tv_status tv_room_see_through(tv_room* room, const tv_camera* camera, const double R[9],
-                              const double t[3], const tv_depth_map* map) {
+tv_status tv_room_see_through(tv_room* room, const tv_depth_map* map) {
   tv::RoomView view;
-  const tv_status status = tv::read_view(room, camera, R, t, map, &view);
+  const tv_status status = tv::read_view(room, map, &view);
   if (status != TV_OK) return status;
   const int32_t k = tv::record_of(*room, view);
   if (k < 0) return TV_ERR_ARGUMENT;
@@ -279,8 +275,8 @@ tv_status tv_room_get_state(const tv_room* room, tv_room_state* state) {
 }
 
 tv_status tv_room_mesh(tv_room* room, const tv_room_mesh_options* options, tv_room_vertex* vertices,
-                       int32_t cap_vertices, tv_room_triangle* triangles, int32_t cap_triangles,
-                       int32_t* num_vertices, int32_t* num_triangles) {
+                       int32_t cap_vertices, int32_t* num_vertices, tv_room_triangle* triangles,
+                       int32_t cap_triangles, int32_t* num_triangles) {
   if (room == nullptr || num_vertices == nullptr || num_triangles == nullptr ||
       (vertices == nullptr && cap_vertices > 0) || (triangles == nullptr && cap_triangles > 0)) {
     return TV_ERR_NULL;
@@ -336,20 +332,21 @@ tv_status tv_room_infer_size(int32_t width, int32_t height, size_t* size_bytes) 
   return TV_OK;
 }
 
-tv_status tv_room_infer(const tv_room* room, const tv_camera* camera, const double R[9],
-                        const double t[3], const tv_depth_map* map, const tv_room_plane* planes,
-                        int32_t num_planes, const tv_room_infer_options* options, void* memory,
-                        size_t size_bytes, float* distance, float* sigma, int32_t* num_pixels) {
-  if ((planes == nullptr && num_planes > 0) || memory == nullptr || distance == nullptr ||
-      sigma == nullptr || num_pixels == nullptr) {
+tv_status tv_room_infer(const tv_room* room, void* memory, size_t size_bytes,
+                        const tv_depth_map* map, const tv_room_infer_options* options,
+                        float* distance, float* sigma, int32_t* num_pixels) {
+  if (memory == nullptr || distance == nullptr || sigma == nullptr || num_pixels == nullptr) {
     return TV_ERR_NULL;
   }
   tv::RoomView view;
-  tv_status status = tv::read_view(room, camera, R, t, map, &view);
+  tv_status status = tv::read_view(room, map, &view);
   tv_room_infer_options checked = tv::kInferDefaults;
   if (status == TV_OK) status = tv::read_sized(options, &checked);
   if (status != TV_OK) return status;
-  if (view.map.pixels == nullptr || view.map.inferred != 0 ||
+  const tv_room_plane* const planes = checked.planes;
+  const int32_t num_planes = checked.num_planes;
+  if (planes == nullptr && num_planes > 0) return TV_ERR_NULL;
+  if (view.map.pixels == nullptr || view.map.inferred != 0 || checked.reserved != 0 ||
       !tv::within(num_planes, 0, TV_ROOM_MAX_PLANES) || !tv::within(checked.max_step, 0, 255)) {
     return TV_ERR_ARGUMENT;
   }

@@ -438,23 +438,26 @@ void tv_two_view_init_sized(tv_two_view* result, size_t struct_size) {
   tv::init_zeros(result, struct_size);
 }
 
-tv_status tv_corrected_camera(const tv_two_view* result, const tv_camera* camera,
-                              tv_camera* corrected) {
-  if (result == nullptr || camera == nullptr || corrected == nullptr) return TV_ERR_NULL;
-  const tv_status status = tv::check_sized_input(result, sizeof(tv_two_view));
+tv_status tv_corrected_pair(const tv_two_view* result, const tv_camera* camera0,
+                            const tv_camera* camera1, tv_camera_pair* pair) {
+  if (result == nullptr || camera0 == nullptr || camera1 == nullptr || pair == nullptr) {
+    return TV_ERR_NULL;
+  }
+  tv_two_view found{};
+  const tv_status status = tv::read_sized(result, &found);
   if (status != TV_OK) return status;
-  *corrected = *camera;
-  const double* const shift = result->principal_point_shift;
-  if (result->struct_size < offsetof(tv_two_view, principal_point_shift) + sizeof(double[2])) {
-    return TV_OK;  // the struct of an older header does not have the field
+  tv_camera_pair corrected{*camera0, *camera1, {}, {}};
+  for (tv_camera* camera : {&corrected.camera0, &corrected.camera1}) {
+    camera->cx += found.principal_point_shift[0];
+    camera->cy += found.principal_point_shift[1];
+    if (found.focal_scale > 0) {
+      camera->fx *= found.focal_scale;
+      camera->fy *= found.focal_scale;
+    }
   }
-  corrected->cx += shift[0];
-  corrected->cy += shift[1];
-  if (result->struct_size >= offsetof(tv_two_view, focal_scale) + sizeof(double) &&
-      result->focal_scale > 0) {
-    corrected->fx *= result->focal_scale;
-    corrected->fy *= result->focal_scale;
-  }
+  std::copy(found.R, found.R + 9, corrected.cam1_from_cam0_R);
+  std::copy(found.t, found.t + 3, corrected.cam1_from_cam0_t);
+  *pair = corrected;
   return TV_OK;
 }
 

@@ -85,14 +85,19 @@ tv_status read_features(const tv_context& context, const tv_features* given, uin
   return overlaps ? TV_ERR_OVERLAP : TV_OK;
 }
 
-tv_status read_pixel_pairs(const tv_pixel_pairs* given, tv_pixel_pairs* pairs) {
+tv_status read_pixels(const tv_pixel_pairs* given, tv_pixel_pairs* pairs) {
   if (given == nullptr) return TV_ERR_NULL;
   *pairs = tv_pixel_pairs{};
   const tv_status status = read_sized(given, pairs);
   if (status != TV_OK) return status;
   if (pairs->num < 0) return TV_ERR_ARGUMENT;
   const bool missing = pairs->pixels0 == nullptr || pairs->pixels1 == nullptr;
-  if (pairs->num > 0 && missing) return TV_ERR_NULL;
+  return pairs->num > 0 && missing ? TV_ERR_NULL : TV_OK;
+}
+
+tv_status read_pixel_pairs(const tv_pixel_pairs* given, tv_pixel_pairs* pairs) {
+  const tv_status status = read_pixels(given, pairs);
+  if (status != TV_OK) return status;
   for (const float* sigmas : {pairs->sigmas0, pairs->sigmas1}) {
     for (int32_t i = 0; sigmas != nullptr && i < pairs->num; ++i) {
       if (!is_finite(sigmas[i])) return TV_ERR_NOT_FINITE;

@@ -43,7 +43,10 @@ inline constexpr float kMaxKeypointSize = 4096.0f;
 inline constexpr double kMostSigmaExponent = 2;
 inline constexpr float kLeastSigma = 0.01f, kLargestSigma = 1000.0f;
 
-// Checks the caller's struct of matched pixels, sigmas included, and copies it to *pairs.
+// Checks the caller's struct of matched pixels but for its sigmas, and copies it to *pairs.
+tv_status read_pixels(const tv_pixel_pairs* given, tv_pixel_pairs* pairs);
+
+// The same with the sigmas, for the calls that read them.
 tv_status read_pixel_pairs(const tv_pixel_pairs* given, tv_pixel_pairs* pairs);
 
 // Whether each keypoint is finite, with coordinates within 1e5 pixels, a size in (0, 4096] pixels

@@ -179,8 +179,8 @@ tv_status tv_adjust_window_size(const tv_window* window, size_t* size_bytes) {
   return TV_OK;
 }
 
-tv_status tv_adjust_window(const tv_window* window, const tv_window_options* options, void* memory,
-                           size_t size_bytes, double* covariances, float* errors_px,
+tv_status tv_adjust_window(void* memory, size_t size_bytes, const tv_window* window,
+                           const tv_window_options* options, double* covariances, float* errors_px,
                            tv_window_result* result) {
   tv_window w;
   tv_status status = tv::read_counts(window, &w);

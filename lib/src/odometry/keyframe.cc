@@ -120,11 +120,12 @@ int32_t triangulate_matches(Odometry* odometry, int32_t keyframe0, int32_t keyfr
   }
   const Rigid cam1_from_cam0 =
       orthonormalised(motion_between(k0.cam_from_world, k1.cam_from_world));
-  const tv_camera* camera = &odometry->camera.model;
-  if (tv_triangulate(TV_TRIANGULATION_ITERATIVE_LS, camera, camera, cam1_from_cam0.R,
-                     cam1_from_cam0.t, pixels0, pixels1, num, points) != TV_OK) {
-    return 0;
-  }
+  const tv_camera& camera = odometry->camera.model;
+  tv_camera_pair pair{camera, camera, {}, {}};
+  std::copy(cam1_from_cam0.R, cam1_from_cam0.R + 9, pair.cam1_from_cam0_R);
+  std::copy(cam1_from_cam0.t, cam1_from_cam0.t + 3, pair.cam1_from_cam0_t);
+  const tv_pixel_pairs pixels = {sizeof pixels, num, pixels0, pixels1, nullptr, nullptr, nullptr};
+  if (tv_triangulate(&pair, &pixels, TV_TRIANGULATION_ITERATIVE_LS, points) != TV_OK) return 0;
   const Rigid world_from_cam0 = inverse(k0.cam_from_world);
   int32_t num_made = 0;
   for (int32_t k = 0; k < num; ++k) {
@@ -152,7 +153,7 @@ int32_t triangulate_matches(Odometry* odometry, int32_t keyframe0, int32_t keyfr
     point->num_visible = point->num_found = 1;
     for (int c = 0; c < 3; ++c) point->seen_from[c] = static_cast<float>(world_from_cam0.t[c]);
     point->depth_sigma = static_cast<float>(
-        std::min(1.0, kTypicalNoise / (camera->fx * static_cast<double>(p.angle_rad))));
+        std::min(1.0, kTypicalNoise / (camera.fx * static_cast<double>(p.angle_rad))));
     point->grey = greys[idx1];
     observe(&map, keyframe0, idx0, made);
     observe(&map, keyframe1, idx1, made);

@@ -371,8 +371,7 @@ void Flight::locate(SourceFrame frame, FlightFrame& record, int32_t near_id) {
   tv_odometry_state state;
   tv_odometry_state_init(&state);
   const tv_image image = view_of(frame.luma), mask = view_of(mask_);
-  check(tv_odometry_locate_masked(odometry_, &image, &mask, near_id, &state),
-        "frame " + frame.name);
+  check(tv_odometry_locate(odometry_, &image, &mask, near_id, &state), "frame " + frame.name);
   // A weak pose that nothing before or after confirms is not written as known.
   if (state.status != TV_ODOMETRY_TRACKING || !state.has_pose) return;
   if (record.origin != PoseOrigin::kNone && state.segment != record.segment) return;

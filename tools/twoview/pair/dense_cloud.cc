@@ -38,22 +38,22 @@ bool is_used(const Outcome& outcome, const tv_dense_point& point) {
 }  // namespace
 
 uint64_t densify_pair(int32_t most, Outcome& outcome) {
-  const tv_two_view& v = outcome.two_view;
-  if (!has_full_pose(v)) return 0;
-  const tv_dense_options options = options_for(most);
-  const tv_camera camera0 = corrected_camera(outcome, 0), camera1 = corrected_camera(outcome, 1);
-  const tv_image image0 = outcome.picture[0].view(), image1 = outcome.picture[1].view();
+  if (!has_full_pose(outcome.two_view)) return 0;
+  const tv_reconstruction& r = outcome.reconstruction;
+  tv_dense_options options = options_for(most);
+  options.sparse = r.points;
+  options.num_sparse = r.num_matches;
+  const tv_camera_pair pair = corrected_pair(outcome);
+  const tv_image images[2] = {outcome.picture[0].view(), outcome.picture[1].view()};
   size_t bytes = 0;
-  check(tv_dense_size(&camera0, &camera1, &options, &bytes), "cannot make a dense cloud");
+  check(tv_dense_size(&pair.camera0, &pair.camera1, &options, &bytes), "cannot make a dense cloud");
   std::vector<uint8_t> room(bytes + TV_CONTEXT_ALIGNMENT);
   const size_t over = reinterpret_cast<uintptr_t>(room.data()) % TV_CONTEXT_ALIGNMENT;
   uint8_t* const memory = room.data() + (over == 0 ? 0 : TV_CONTEXT_ALIGNMENT - over);
   std::vector<tv_dense_point> points(static_cast<size_t>(most));
   int32_t count = 0;
-  const tv_reconstruction& r = outcome.reconstruction;
   const uint64_t start_ns = now_ns();
-  check(tv_densify(&image0, &image1, &camera0, &camera1, v.R, v.t, r.points, r.num_matches,
-                   &options, memory, bytes, points.data(), most, &count),
+  check(tv_densify(memory, bytes, &pair, images, &options, points.data(), most, &count),
         "cannot make a dense cloud");
   const uint64_t time_ns = now_ns() - start_ns;
   points.resize(static_cast<size_t>(count));

@@ -6,6 +6,7 @@
 #include <opencv2/core.hpp>
 
 #include "base/error.h"
+#include "base/two_views.h"
 
 namespace cli {
 namespace {
@@ -101,13 +102,10 @@ void require_order(const Picture pictures[2], const std::string& name, const Mat
 
 void triangulate(const Options& options, const MatchList& matches, Outcome& outcome) {
   OwnArrays& own = outcome.own;
-  tv_camera cameras[2];
-  for (size_t v = 0; v < 2; ++v)
-    tv_corrected_camera(&outcome.two_view, &outcome.camera[v], &cameras[v]);
-  check(tv_triangulate(static_cast<tv_triangulation>(options.triangulation), &cameras[0],
-                       &cameras[1], outcome.two_view.R, outcome.two_view.t,
-                       matches.pixels[0].data(), matches.pixels[1].data(),
-                       static_cast<int32_t>(matches.size()), own.points.data()),
+  const tv_camera_pair pair = corrected_pair(outcome);
+  const tv_pixel_pairs pixels = pixel_pairs(matches.pixels);
+  check(tv_triangulate(&pair, &pixels, static_cast<tv_triangulation>(options.triangulation),
+                       own.points.data()),
         "cannot triangulate");
   for (size_t i = 0; i < matches.size(); ++i) {
     if (own.inlier_mask[i] == 0) {
@@ -210,11 +208,7 @@ uint64_t estimate_own_matches(Session& session, const Options& options, const Ma
   tv_context* const context =
       session.context(std::max(a.cols, b.cols), std::max(a.rows, b.rows), matches.size());
   fill_arrays(options, matches, outcome);
-  tv_pixel_pairs pairs;
-  tv_pixel_pairs_init(&pairs);
-  pairs.num = static_cast<int32_t>(matches.size());
-  pairs.pixels0 = matches.pixels[0].data();
-  pairs.pixels1 = matches.pixels[1].data();
+  tv_pixel_pairs pairs = pixel_pairs(matches.pixels);
   pairs.ratios = matches.ratios.empty() ? nullptr : matches.ratios.data();
   tv_two_view_init(&outcome.two_view);
   const uint64_t start_ns = now_ns();

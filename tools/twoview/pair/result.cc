@@ -180,11 +180,11 @@ void append_json(std::string& text, const Json& json, size_t depth) {
 
 }  // namespace
 
-tv_camera corrected_camera(const Outcome& outcome, int camera) {
-  tv_camera corrected = outcome.camera[camera];
-  check(tv_corrected_camera(&outcome.two_view, &corrected, &corrected),
-        "cannot correct the camera");
-  return corrected;
+tv_camera_pair corrected_pair(const Outcome& outcome) {
+  tv_camera_pair pair;
+  check(tv_corrected_pair(&outcome.two_view, &outcome.camera[0], &outcome.camera[1], &pair),
+        "cannot correct the cameras");
+  return pair;
 }
 
 double unit_of(const Outcome& outcome) { return outcome.scale ? outcome.scale->baseline_m : 1; }

@@ -48,10 +48,10 @@ struct Outcome {
   std::vector<std::string> notes;    // what the program decided by itself, for the report
 };
 
-// The camera that pose and points refer to: the camera file's, with the estimated shift added to
-// the principal point, and the focal length multiplied by the factor of the estimate where it was
-// refined.
-tv_camera corrected_camera(const Outcome& outcome, int camera);
+// The cameras that pose and points refer to, and the pose: the camera files', with the estimated
+// shift added to the principal point, and the focal length multiplied by the factor of the estimate
+// where it was refined.
+tv_camera_pair corrected_pair(const Outcome& outcome);
 
 // The factor from the unit of the two-view pose and its points to the unit of the outputs: the
 // baseline in metres when the scale is known, else 1.

@@ -25,7 +25,9 @@ class Epipolar {
     const tv_two_view& v = outcome.two_view;
     by_rays_ = has_full_pose(v) && outcome.has_cameras;
     if (by_rays_) {
-      for (int image = 0; image < 2; ++image) camera_[image] = corrected_camera(outcome, image);
+      const tv_camera_pair pair = corrected_pair(outcome);
+      camera_[0] = pair.camera0;
+      camera_[1] = pair.camera1;
       const Matrix3 R = rotation_of(v);
       const Vector3 t = translation_of(v);
       matrix_ = product(Matrix3{0, -t[2], t[1], t[2], 0, -t[0], -t[1], t[0], 0}, R);

@@ -117,7 +117,7 @@ void RoomBuilder::begin(double voxel) {
       std::max(2, static_cast<int32_t>(std::ceil(kTruncationVoxels * first_voxel_ / voxel)));
   const size_t bytes = static_cast<size_t>(settings_.max_memory_mib) << 20;
   memory_.resize(bytes + TV_CONTEXT_ALIGNMENT);
-  check(tv_room_init(&options, aligned(memory_), bytes, &room_), "cannot make a room");
+  check(tv_room_init(&room_, &options, aligned(memory_), bytes), "cannot make a room");
 }
 
 void RoomBuilder::add_picture(size_t k, const RoomPicture& picture) {
@@ -172,11 +172,15 @@ void RoomBuilder::run(const Job& job) {
 }
 
 void RoomBuilder::fill(const Map& map, tv_depth_map& out) {
+  const RoomView& view = scene_.views[map.view];
   const tv_camera& camera = sweep_.map_camera();
   map.pixels.unpack(pixels_);
   tv_depth_map_init(&out);
   out.width = out.stride = camera.width;
   out.height = camera.height;
+  out.camera = &camera;
+  std::copy(view.R.begin(), view.R.end(), out.world_from_cam_R);
+  std::copy(view.t.begin(), view.t.end(), out.world_from_cam_t);
   out.distance = pixels_.distance.data();
   out.sigma = pixels_.sigma.data();
   out.pixels = pixels_.rgb.data();
@@ -188,13 +192,11 @@ void RoomBuilder::fill(const Map& map, tv_depth_map& out) {
 
 // False where the memory is full.
 bool RoomBuilder::add(const Map& map) {
-  const RoomView& view = scene_.views[map.view];
   tv_depth_map given;
   fill(map, given);
-  const tv_status status =
-      tv_room_add(room_, &sweep_.map_camera(), view.R.data(), view.t.data(), &given);
+  const tv_status status = tv_room_add(room_, &given);
   if (status == TV_ERR_CAPACITY) return false;
-  check(status, "the depth map of " + view.name);
+  check(status, "the depth map of " + scene_.views[map.view].name);
   return true;
 }
 
@@ -258,13 +260,11 @@ void RoomBuilder::find_planes(RoomModel& model) const {
 size_t RoomBuilder::see_through() {
   size_t num = 0;
   for (const Map& map : maps_) {
-    const RoomView& view = scene_.views[map.view];
     tv_depth_map given;
     fill(map, given);
-    const tv_status status =
-        tv_room_see_through(room_, &sweep_.map_camera(), view.R.data(), view.t.data(), &given);
+    const tv_status status = tv_room_see_through(room_, &given);
     if (status == TV_ERR_ARGUMENT) continue;
-    check(status, "the depth map of " + view.name);
+    check(status, "the depth map of " + scene_.views[map.view].name);
     ++num;
   }
   return num;
@@ -278,26 +278,29 @@ void RoomBuilder::infer(RoomModel& model) {
   check(tv_room_infer_size(camera.width, camera.height, &bytes), "the plain walls");
   std::vector<uint8_t> memory(bytes + TV_CONTEXT_ALIGNMENT);
   std::vector<float> distance(pixels_.distance.size()), sigma(pixels_.distance.size());
+  tv_room_infer_options options;
+  tv_room_infer_options_init(&options);
+  options.planes = model.planes.data();
+  options.num_planes = static_cast<int32_t>(model.planes.size());
   for (const Map& map : maps_) {
-    const RoomView& view = scene_.views[map.view];
+    const std::string what = "the plain walls of " + scene_.views[map.view].name;
     tv_depth_map given;
     fill(map, given);
     distance.resize(pixels_.distance.size());
     sigma.resize(pixels_.distance.size());
     int32_t num_pixels = 0;
-    check(tv_room_infer(room_, &camera, view.R.data(), view.t.data(), &given, model.planes.data(),
-                        static_cast<int32_t>(model.planes.size()), nullptr, aligned(memory), bytes,
-                        distance.data(), sigma.data(), &num_pixels),
-          "the plain walls of " + view.name);
+    check(tv_room_infer(room_, aligned(memory), bytes, &given, &options, distance.data(),
+                        sigma.data(), &num_pixels),
+          what);
     if (num_pixels == 0) continue;
     given.distance = distance.data();
     given.sigma = sigma.data();
     given.inferred = 1;
-    const tv_status status = tv_room_add(room_, &camera, view.R.data(), view.t.data(), &given);
+    const tv_status status = tv_room_add(room_, &given);
     if (status == TV_ERR_CAPACITY || status == TV_ERR_LIMITS)
       ++model.inferred_without_memory;
     else
-      check(status, "the plain walls of " + view.name);
+      check(status, what);
   }
 }
 
@@ -316,12 +319,12 @@ RoomMesh RoomBuilder::mesh(const RoomModel& model) const {
   options.max_sigma = kMostSigmaVoxels * state.voxel;
   int32_t num_vertices = 0, num_triangles = 0;
   tv_status status =
-      tv_room_mesh(room_, &options, nullptr, 0, nullptr, 0, &num_vertices, &num_triangles);
+      tv_room_mesh(room_, &options, nullptr, 0, &num_vertices, nullptr, 0, &num_triangles);
   if (status == TV_ERR_CAPACITY) {
     mesh.vertices.resize(static_cast<size_t>(num_vertices));
     mesh.triangles.resize(static_cast<size_t>(num_triangles));
-    status = tv_room_mesh(room_, &options, mesh.vertices.data(), num_vertices,
-                          mesh.triangles.data(), num_triangles, &num_vertices, &num_triangles);
+    status = tv_room_mesh(room_, &options, mesh.vertices.data(), num_vertices, &num_vertices,
+                          mesh.triangles.data(), num_triangles, &num_triangles);
   }
   check(status, "the surface");
   mesh.vertices.resize(static_cast<size_t>(num_vertices));

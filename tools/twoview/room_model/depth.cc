@@ -137,8 +137,8 @@ KnownPixels DepthSweep::run(const std::vector<const RoomView*>& views,
   options_.far_depth = far_depth;
   const tv_depth_arrays arrays{pixels_.distance.data(), pixels_.sigma.data(), witnesses_.data(),
                                grey_.data()};
-  check(tv_sweep_depth(swept.data(), static_cast<int32_t>(swept.size()), &options_,
-                       aligned(memory_), memory_bytes_, &arrays),
+  check(tv_sweep_depth(aligned(memory_), memory_bytes_, swept.data(),
+                       static_cast<int32_t>(swept.size()), &options_, &arrays),
         "the depth of " + views[0]->name);
   const RoomPicture& picture = *pictures[0];
   const cv::Size size(map_camera_.width, map_camera_.height);

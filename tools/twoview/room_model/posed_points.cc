@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/two_views.h"
 
 namespace cli {
 namespace {
@@ -62,9 +63,9 @@ std::vector<tv_point> PosedPoints::points_of(const Pairs& pairs, const Matrix3 R
   const Vector3 translation = applied(cam1_from_world, way);
   if (!(norm(translation) > 0)) return {};
   std::vector<tv_point> points(pairs.size());
-  check(tv_triangulate(TV_TRIANGULATION_ITERATIVE_LS, &scene_.camera, &scene_.camera,
-                       rotation.data(), translation.data(), pairs.pixels[0].data(),
-                       pairs.pixels[1].data(), static_cast<int32_t>(pairs.size()), points.data()),
+  const tv_camera_pair cameras = camera_pair(scene_.camera, scene_.camera, rotation, translation);
+  const tv_pixel_pairs pixels = pixel_pairs(pairs.pixels);
+  check(tv_triangulate(&cameras, &pixels, TV_TRIANGULATION_ITERATIVE_LS, points.data()),
         "cannot triangulate " + scene_.views[pairs.views[0]].name + " and " +
             scene_.views[pairs.views[1]].name);
   return points;
@@ -84,11 +85,7 @@ void PosedPoints::triangulate(const Pairs& pairs) {
 }
 
 void PosedPoints::confirm(const Pairs& pairs) {
-  tv_pixel_pairs given;
-  tv_pixel_pairs_init(&given);
-  given.num = static_cast<int32_t>(pairs.size());
-  given.pixels0 = pairs.pixels[0].data();
-  given.pixels1 = pairs.pixels[1].data();
+  const tv_pixel_pairs given = pixel_pairs(pairs.pixels);
   tv_two_view found;
   tv_two_view_init(&found);
   std::vector<uint8_t> is_inlier(pairs.size());

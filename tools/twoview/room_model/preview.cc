@@ -53,7 +53,7 @@ void RoomPreview::begin(double voxel) {
   tv_room_options options;
   tv_room_options_init(&options);
   options.voxel = voxel_ = voxel;
-  check(tv_room_init(&options, aligned(memory_), kRoomBytes, &room_), "the room of the page");
+  check(tv_room_init(&room_, &options, aligned(memory_), kRoomBytes), "the room of the page");
   for (const auto& map : maps_) map->placed.is_present = false;
 }
 
@@ -100,6 +100,9 @@ tv_status RoomPreview::with_room(const Map& map, const PreviewPlace& place, bool
   tv_depth_map_init(&given);
   given.width = given.stride = map.camera.width;
   given.height = map.camera.height;
+  given.camera = &map.camera;
+  std::copy(place.R.begin(), place.R.end(), given.world_from_cam_R);
+  std::copy(place.t.begin(), place.t.end(), given.world_from_cam_t);
   given.distance = pixels_.distance.data();
   given.sigma = pixels_.sigma.data();
   given.pixels = pixels_.rgb.data();
@@ -107,8 +110,7 @@ tv_status RoomPreview::with_room(const Map& map, const PreviewPlace& place, bool
   given.channels = 3;
   given.mask = pixels_.shown.data();
   given.mask_stride_bytes = map.camera.width;
-  return (adds ? tv_room_add : tv_room_remove)(room_, &map.camera, place.R.data(), place.t.data(),
-                                               &given);
+  return (adds ? tv_room_add : tv_room_remove)(room_, &given);
 }
 
 // False where the room has begun anew for it, with voxels of twice the side.
@@ -175,12 +177,12 @@ std::string RoomPreview::surface() {
   options.max_sigma = kMostSigmaVoxels * voxel_;
   int32_t num_vertices = 0, num_triangles = 0;
   tv_status status =
-      tv_room_mesh(room_, &options, nullptr, 0, nullptr, 0, &num_vertices, &num_triangles);
+      tv_room_mesh(room_, &options, nullptr, 0, &num_vertices, nullptr, 0, &num_triangles);
   std::vector<tv_room_vertex> vertices(static_cast<size_t>(num_vertices));
   std::vector<tv_room_triangle> triangles(static_cast<size_t>(num_triangles));
   if (status == TV_ERR_CAPACITY)
-    status = tv_room_mesh(room_, &options, vertices.data(), num_vertices, triangles.data(),
-                          num_triangles, &num_vertices, &num_triangles);
+    status = tv_room_mesh(room_, &options, vertices.data(), num_vertices, &num_vertices,
+                          triangles.data(), num_triangles, &num_triangles);
   check(status, "the surface of the page");
   return surface_bytes(vertices, triangles);
 }

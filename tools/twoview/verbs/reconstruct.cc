@@ -402,9 +402,8 @@ int write_rerun(const Arguments& a, const Outcome& outcome, const std::string& f
   if (!a.recording.given()) arguments.insert(arguments.end(), {"--images", a.image[0], a.image[1]});
   if (outcome.has_cameras) {
     arguments.emplace_back("--intrinsics");
-    for (const tv_camera& given : outcome.camera) {
-      tv_camera camera;
-      tv_corrected_camera(&outcome.two_view, &given, &camera);
+    const tv_camera_pair pair = corrected_pair(outcome);
+    for (const tv_camera& camera : {pair.camera0, pair.camera1}) {
       for (const double value : {camera.fx, camera.fy, camera.cx, camera.cy}) {
         char digits[32];
         std::snprintf(digits, sizeof digits, "%.17g", value);

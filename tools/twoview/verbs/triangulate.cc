@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/output.h"
+#include "base/two_views.h"
 #include "files/camera_formats.h"
 #include "files/image_file.h"
 #include "files/matches_file.h"
@@ -173,15 +174,14 @@ std::vector<tv_point> triangulated(Arguments& a, const MatchList& matches, const
                                    const ImageCameras& cameras) {
   constexpr size_t kTelling = 20;  // matches
   require_inside(a, matches, cameras);
-  const tv_camera camera[2] = {pose.corrected(cameras[0].camera),
-                               pose.corrected(cameras[1].camera)};
+  const tv_camera camera0 = pose.corrected(cameras[0].camera);
+  const tv_camera camera1 = pose.corrected(cameras[1].camera);
+  const tv_pixel_pairs pixels = pixel_pairs(matches.pixels);
   std::vector<tv_point> points(matches.size());
   const auto method = static_cast<tv_triangulation>(a.common.options.triangulation);
   const auto triangulate = [&](const Pose3& by) {
-    check(tv_triangulate(method, &camera[0], &camera[1], by.first.data(), by.second.data(),
-                         matches.pixels[0].data(), matches.pixels[1].data(),
-                         static_cast<int32_t>(points.size()), points.data()),
-          "cannot triangulate " + a.matches);
+    const tv_camera_pair pair = camera_pair(camera0, camera1, by.first, by.second);
+    check(tv_triangulate(&pair, &pixels, method, points.data()), "cannot triangulate " + a.matches);
   };
   const auto share_of = [&](const Pose3& by) {
     triangulate(by);

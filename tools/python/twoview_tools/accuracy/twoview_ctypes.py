@@ -90,7 +90,7 @@ MAX_EFFORT = 3  # the highest rung of tv_reconstruct_options.max_effort
 
 def _keywords(struct):
     """The fields of an options struct as keywords for the package's functions."""
-    return {name: getattr(struct, name) for name, _ in struct._fields_[1:]}
+    return {name: getattr(struct, name) for name, _ in struct._fields_[1:] if name != "reserved"}
 
 
 class Context(twoview.Context):

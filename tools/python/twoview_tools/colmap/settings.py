@@ -20,7 +20,7 @@ SIGMAS_OF_THE_CAMERA = dict.fromkeys(("focal_sigma0", "focal_sigma1", "center_si
 _FROM_CAMERA = "that of the camera"
 # --effort: the rung to begin with, and the highest one, of tv_reconstruct_options.
 EFFORTS = {"fixed": (0, 0), "auto": (0, 3), **{str(rung): (rung, rung) for rung in range(4)}}
-_NOT_HERE = ("gravity0", "gravity1", "gravity_sigma_rad", "reserved")
+_NOT_HERE = ("gravity0", "gravity1", "gravity_sigma_rad")
 
 
 def _spelt(value):
@@ -42,7 +42,7 @@ def _choice(enum):
 
 
 def add_options(parser, kinds=_KINDS, **defaults):
-    """Adds a flag for each field of the options, except those of gravity and `reserved`.
+    """Adds a flag for each field of the options, except those of gravity.
     `defaults` are those that differ from the library's."""
     group = parser.add_argument_group("options of the stages (docs/cli.md)")
     for kind in kinds:

@@ -15,5 +15,5 @@ PACKAGECONFIG[room] = "-DTWOVIEW_ROOM=ON,-DTWOVIEW_ROOM=OFF"
 
 EXTRA_OECMAKE = "-DTWOVIEW_TOOLS=OFF -DTWOVIEW_DRIVERS=OFF -DBUILD_TESTING=OFF"
 
-# FILES:${PN}, -dev and -staticdev are Yocto's defaults: the image gets libtwoview.so.0.1 alone.
+# FILES:${PN}, -dev and -staticdev are Yocto's defaults: the image gets libtwoview.so.0.2 alone.
 BBCLASSEXTEND = "native nativesdk"

@@ -6,6 +6,7 @@
 #define TWOVIEW_TRIANGULATE_H
 
 #include "twoview/camera.h"
+#include "twoview/two_view.h"
 
 TV_BEGIN_DECLS
 
@@ -66,35 +67,30 @@ typedef struct tv_point {
   int32_t reserved;
 } tv_point;
 
-/* Triangulates num_points matches.
-   R, t: cam1_from_cam0, that is x1 = R x0 + t. R is a row-major 3x3 rotation to within 1e-6; t is
-   not zero.
-   pixels0, pixels1: num_points x 2 (x, y), distorted as in the images. A pixel that is not finite
-   makes its point TV_POINT_INVALID and is no error.
-   points: room for num_points; it overlaps neither pixels0 nor pixels1.
-   Returns TV_ERR_NULL, TV_ERR_ARGUMENT (the method, the count, R or t), TV_ERR_NOT_FINITE (R or t),
-   TV_ERR_CAMERA, TV_ERR_OVERLAP. Needs no context. Thread-safe. */
-TV_API tv_status tv_triangulate(tv_triangulation method, const tv_camera *camera0,
-                                const tv_camera *camera1, const double R[9], const double t[3],
-                                const double *pixels0, const double *pixels1, int32_t num_points,
-                                tv_point *points);
+/* Triangulates matches.
+   pair: the cameras and the motion.
+   pixels: the matched pixels; ratios and sigmas are not read. A pixel that is not finite makes its
+   point TV_POINT_INVALID and is no error.
+   points: room for pixels->num; it overlaps no other argument.
+   Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (the method, the count, R or t),
+   TV_ERR_NOT_FINITE (R or t), TV_ERR_CAMERA, TV_ERR_OVERLAP. Needs no context. Thread-safe. */
+TV_API tv_status tv_triangulate(const tv_camera_pair *pair, const tv_pixel_pairs *pixels,
+                                tv_triangulation method, tv_point *points);
 
 /* Moves the pixels of each match as little as possible so that their rays meet. "As little" is the
    sum of the squared distances for cost TV_TRIANGULATION_POLY and the sum of the distances for
    TV_TRIANGULATION_POLY_ABS; other costs are TV_ERR_ARGUMENT. Distances are measured as documented
    at tv_triangulation; the pixels themselves are distorted, before and after. The rays may meet
    behind a camera, which tv_triangulate reports.
-   The cameras, R, t, pixels0 and pixels1 are as for tv_triangulate.
-   corrected0, corrected1: room for num_points x 2; they overlap no other argument.
-   valid: room for num_points bytes. A byte is 1 where the match was corrected. It is 0, and both
+   pair, pixels: as for tv_triangulate.
+   corrected0, corrected1: room for pixels->num x 2; they overlap no other argument.
+   valid: room for pixels->num bytes. A byte is 1 where the match was corrected. It is 0, and both
    pixels are (0, 0), where a pixel has no ray or is not finite, or where a corrected pixel would
-   lie outside the valid region of its lens. Returns TV_ERR_NULL, TV_ERR_ARGUMENT (the cost, the
-   count, R or t), TV_ERR_NOT_FINITE (R or t), TV_ERR_CAMERA, TV_ERR_OVERLAP. Needs no context.
-   Thread-safe. */
-TV_API tv_status tv_correct_matches(tv_triangulation cost, const tv_camera *camera0,
-                                    const tv_camera *camera1, const double R[9], const double t[3],
-                                    const double *pixels0, const double *pixels1,
-                                    int32_t num_points, double *corrected0, double *corrected1,
+   lie outside the valid region of its lens. Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE,
+   TV_ERR_ARGUMENT (the cost, the count, R or t), TV_ERR_NOT_FINITE (R or t), TV_ERR_CAMERA,
+   TV_ERR_OVERLAP. Needs no context. Thread-safe. */
+TV_API tv_status tv_correct_matches(const tv_camera_pair *pair, const tv_pixel_pairs *pixels,
+                                    tv_triangulation cost, double *corrected0, double *corrected1,
                                     uint8_t *valid);
 
 TV_END_DECLS

@@ -45,8 +45,19 @@ typedef struct tv_camera {
   double k[8];
 } tv_camera;
 
+/* Two cameras and the motion between them: all that a point's two pixels depend on. It holds its
+   values and points to nothing, so that it may be kept and copied. tv_corrected_pair makes it from
+   the result of an estimate; with a known motion, the caller fills every field. */
+typedef struct tv_camera_pair {
+  /* The cameras of image 0 and of image 1; any models. */
+  tv_camera camera0, camera1;
+  /* The motion: x1 = R x0 + t. R is a row-major 3x3 rotation to within 1e-6; t is not zero, and its
+     unit is that of all points that are computed with it. */
+  double cam1_from_cam0_R[9], cam1_from_cam0_t[3];
+} tv_camera_pair;
+
 /* Returns TV_OK where the camera is valid, else TV_ERR_NULL or TV_ERR_CAMERA. Every function that
-   takes a camera checks it like this, except for tv_corrected_camera.
+   takes a camera checks it like this, except for tv_corrected_pair.
    The functions below compute the valid region of the lens model anew at each call, which takes
    about 10 microseconds for a distorted camera on a desktop core. Those that take many points do it
    once for all of them. Thread-safe, as all functions of this header. */

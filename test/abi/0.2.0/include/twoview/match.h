@@ -29,6 +29,17 @@ typedef struct tv_match_options {
   /* A match is kept where its ratio is below this value in both directions; (0, 1], default 0.92. A
      bigger value gives more matches, of which more are wrong; 1 rejects only exact ties. */
   float ratio;
+  /* Only keypoints at least this far from the nearest one, in pixels of the image as given, count
+     as the second nearest one; [0, 1000], default 10. 0: all others count. Nearer ones are second
+     orientations of the same corner, the same corner on another level, or its neighbours on the
+     same edge, whose descriptors are alike without making the match uncertain. A bigger value gives
+     more matches. */
+  float neighbourhood_px;
+  /* The L2 distance of descriptors that replaces the distance to the second nearest one where that
+     is larger or where there is none, as in tv_guided_options; [0, 3000], default 0: no such bound.
+     A smaller value rejects matches whose descriptors are unlike though nothing else is like
+     them. */
+  float max_distance;
 } tv_match_options;
 
 /* Writes the default options into a struct of struct_size bytes; null is allowed. Programs call
@@ -42,18 +53,38 @@ TV_API void tv_match_options_init_sized(tv_match_options *options, size_t struct
    one with the lower index counts as nearer. When both images are exchanged, the pairs are the same
    ones, exchanged. If an image has only one descriptor, there is no second nearest one, and nothing
    is matched.
-   features0, features1: the descriptors of the two images; keypoints are not read and may be null.
-   options: null means the defaults.
-   correspondences: room for cap_correspondences, in ascending order of idx0; the smaller of both
-   counts of features is always enough.
-   *num_correspondences: how many were written; on TV_ERR_CAPACITY how many there are.
-   Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS, TV_ERR_CAPACITY,
-   TV_ERR_OVERLAP.
-   Time: 128 multiply-adds for each pair of descriptors. */
+   With neighbourhood_px above 0 the second nearest one is the nearest of those whose keypoints are
+   at least that far from the nearest one's keypoint: sqrt(dx^2 + dy^2) >= neighbourhood_px. Equal
+   descriptors within the neighbourhood then compete by their index only; where an equal one is
+   outside it, the pair is rejected as always. Where an image has no keypoint that far away, there
+   is no second nearest one.
+   features0, features1: the descriptors of the two images, with their keypoints, of which every
+   field is checked as tv_describe checks it. Descriptors without keypoints, as of other programs,
+   may be matched, too: where both are null, neighbourhood_px counts as 0; where one is null,
+   TV_ERR_NULL is returned. With neighbourhood_px 0 keypoints are not read. options: null means the
+   defaults. correspondences: room for cap_correspondences, in ascending order of idx0; the smaller
+   of both counts of features is always enough. *num_correspondences: how many were written; on
+   TV_ERR_CAPACITY how many there are. Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE,
+   TV_ERR_LIMITS, TV_ERR_NOT_FINITE, TV_ERR_CAPACITY, TV_ERR_OVERLAP. Time: 128 multiply-adds for
+   each of the num0 x num1 pairs of descriptors; where descriptors are equal or neighbourhoods are
+   crowded with similar ones, for at most num0 x (2 num0 + 3 num1 + 130) pairs (five times as many
+   for equal large counts), with a distance of keypoints for each. Source of the neighbourhood: D.
+   Mishkin, J. Matas, M. Perdoch, "MODS: Fast and robust method for two-view matching", CVIU 2015
+   (first geometrically inconsistent nearest neighbour). */
 TV_API tv_status tv_match(tv_context *context, const tv_features *features0,
                           const tv_features *features1, const tv_match_options *options,
                           tv_correspondence *correspondences, int32_t cap_correspondences,
                           int32_t *num_correspondences);
+
+/* The epipolar geometry of two images, as an input of tv_match_guided. The caller fills every
+   field; the cameras are read during the call only. */
+typedef struct tv_epipolar {
+  /* Both cameras, any models, where `matrix` is E; both null where it is F. */
+  const tv_camera *camera0, *camera1;
+  /* Row-major 3x3 of any scale, finite: E (tv_two_view.E) where there are cameras, for which the
+     band is measured in pixels of the images as given; else F of the pixels (tv_two_view.F). */
+  double matrix[9];
+} tv_epipolar;
 
 /* Options of tv_match_guided. Filled by tv_guided_options_init. */
 typedef struct tv_guided_options {
@@ -89,9 +120,7 @@ TV_API void tv_guided_options_init_sized(tv_guided_options *options, size_t stru
    distance to the second nearest keypoint in the band, the larger of the two directions. Of equal
    distances the one with the lower index counts as nearer. Exchanged views with the transposed
    matrix give the same pairs, exchanged. A keypoint outside its lens's valid region is not matched.
-   camera0, camera1: both cameras, with E in `epipolar` (tv_two_view.E); any lens is possible, since
-   the band is measured in pixels of the images as given. Or both null, with F of the pixels.
-   epipolar: row-major 3x3, finite.
+   epipolar: the known geometry. One camera alone is TV_ERR_ARGUMENT.
    features0, features1: keypoints and descriptors of the two images. Every field of the keypoints
    is checked as tv_describe checks it. options: null means the defaults. correspondences: room for
    cap_correspondences, in ascending order of idx0; the smaller of both counts of features is always
@@ -100,12 +129,39 @@ TV_API void tv_guided_options_init_sized(tv_guided_options *options, size_t stru
    TV_ERR_NOT_FINITE, TV_ERR_CAPACITY, TV_ERR_OVERLAP.
    Time: a product of three numbers for each pair of keypoints, and 128 multiply-adds, at most
    twice, for each pair in a band. */
-TV_API tv_status tv_match_guided(tv_context *context, const tv_camera *camera0,
-                                 const tv_camera *camera1, const double epipolar[9],
+TV_API tv_status tv_match_guided(tv_context *context, const tv_epipolar *epipolar,
                                  const tv_features *features0, const tv_features *features1,
                                  const tv_guided_options *options,
                                  tv_correspondence *correspondences, int32_t cap_correspondences,
                                  int32_t *num_correspondences);
+
+/* Moves one keypoint of each match to where the 8 x 8 samples around it fit best to those around
+   the other keypoint, under an affine map, a gain and an offset (least-squares matching; A. W.
+   Gruen, South African Journal of Photogrammetry 14(3), 1985). tv_reconstruct calls it between
+   tv_match and tv_estimate_two_view unless align_matches is 0. The keypoint of the larger size
+   stays. The other one moves by at most 1.2 times its size over size_of_one, in pixels; only x and
+   y change. Neither moves where the samples leave the image, have too little texture, or do not
+   fit. Exchanged images give the same positions. Two matches one after the other whose keypoints
+   are at the same places, as of a corner with two orientations, move together.
+   images: image 0 and image 1, within the context's limits.
+   matches: num_matches, as tv_match returns them; where a keypoint is part of several matches, they
+   are aligned in their order, and exchanged images may give other positions.
+   size_of_one: the size of a keypoint of the full image, (0, 4096], best
+   tv_feature_options.keypoint_size.
+   keypoints: the arrays of both images, num_keypoints[0] and num_keypoints[1] long: as they were
+   found before the call, moved after it. Every field is checked as tv_describe checks it.
+   aligned: room for num_matches bytes; a byte is 0 where the match was not aligned, else the
+   standard deviation of the aligned position over that of its keypoints, in 128ths, 1 to 255: the
+   less the pixels differ after the fit and the more texture they have, the smaller it is.
+   tv_reconstruct multiplies the sigmas of both keypoints (tv_keypoint_sigmas) of such a match by
+   byte / 128.
+   Returns TV_ERR_NULL, TV_ERR_ARGUMENT (also an index out of its range), TV_ERR_NOT_FINITE,
+   TV_ERR_LIMITS, TV_ERR_OVERLAP; nothing is written then. The context is one made for
+   TV_PURPOSE_EXTRACT. Time: at most four fits of 64 samples a match. docs/algorithms/match.md. */
+TV_API tv_status tv_align_matches(tv_context *context, const tv_image images[2],
+                                  const tv_correspondence *matches, int32_t num_matches,
+                                  float size_of_one, tv_keypoint *const keypoints[2],
+                                  const int32_t num_keypoints[2], uint8_t *aligned);
 
 TV_END_DECLS
 

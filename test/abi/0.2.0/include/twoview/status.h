@@ -65,19 +65,35 @@ typedef enum tv_status {
   /* An output array overlaps another argument. */
   TV_ERR_OVERLAP = 9,
   /* A camera has an unknown model, a size or focal length that is not above 0, a number that is not
-     finite, or a reserved field that is not 0. */
+     finite, or a reserved field that is not 0; or it is for images of another size than its image
+     (tv_reconstruct). */
   TV_ERR_CAMERA = 10,
   /* A pixel or a ray lies outside the region in which the lens model is valid. */
   TV_ERR_OUTSIDE = 11,
   /* This CPU or this build of the library does not have the kernel set that was chosen. */
-  TV_ERR_KERNELS = 12
+  TV_ERR_KERNELS = 12,
+  /* The bytes are no map, are cut or altered, or are of a version that this library does not know
+     (tv_odometry_load). */
+  TV_ERR_MAP = 13,
+  /* A frame's time is not later than that of the frame before it, and its gap is 0
+     (tv_odometry_track). */
+  TV_ERR_TIME = 14,
+  /* The stride of a frame's image is below its width, or so large that its rows have no addresses
+     (tv_odometry_track, tv_odometry_locate). */
+  TV_ERR_STRIDE = 15,
+  /* The mask of a frame is not of its image's size, or its stride does not fit its width
+     (tv_odometry_track, tv_odometry_locate). */
+  TV_ERR_MASK = 16,
+  /* effort or max_effort of the options is above max_effort of the limits that the context was made
+     with (tv_reconstruct). */
+  TV_ERR_EFFORT = 17
 } tv_status;
 
 /* Returns a short English phrase for a status, or "unknown status" for any other number. The string
    is constant and never freed. Thread-safe. */
 TV_API const char *tv_status_string(tv_status status);
 
-/* Returns the version of the library that is linked, such as "0.1.0". It can differ from
+/* Returns the version of the library that is linked, such as "0.2.0". It can differ from
    TV_VERSION_STRING, which is the version of the headers that the program was compiled with. The
    string is constant and never freed. Thread-safe. */
 TV_API const char *tv_version_string(void);

@@ -1,7 +1,8 @@
 /* twoview: the geometry of two views from matched pixels.
 
    Formulas, papers, the rules of the verdict, and tests: docs/algorithms/two_view.md,
-   docs/algorithms/gravity.md, docs/algorithms/principal_point.md. */
+   docs/algorithms/gravity.md, docs/algorithms/principal_point.md, docs/algorithms/camera_misfit.md,
+   docs/algorithms/covariance.md. */
 #ifndef TWOVIEW_TWO_VIEW_H
 #define TWOVIEW_TWO_VIEW_H
 
@@ -15,13 +16,19 @@ TV_BEGIN_DECLS
 typedef struct tv_pixel_pairs {
   /* The caller's sizeof, set by tv_pixel_pairs_init. */
   uint32_t struct_size;
-  /* How many pairs there are, [0, the context's max_matches]. */
+  /* How many pairs there are, at least 0; for a call with a context at most its max_matches. */
   int32_t num;
   /* num x 2 (x, y) each, in pixels, distorted as in the images. */
   const double *pixels0, *pixels1;
   /* Null, or `num` values, of which a lower one marks a more certain match
      (tv_correspondence.ratio): more certain matches are sampled first. */
   const float *ratios;
+  /* Null (1 for all), or `num` values each, [0.01, 1000]: the standard deviation of the pixel in
+     image 0 and in image 1, relative to that of the most precise pixels. A residual is divided by
+     the standard deviation that both sigmas give it: a match whose two pixels have the sigma s is
+     an inlier up to s max_error_px, and has 1 / s^2 times the weight in the pose.
+     tv_keypoint_sigmas computes sigmas from the sizes of keypoints. */
+  const float *sigmas0, *sigmas1;
 } tv_pixel_pairs;
 
 /* Writes zeros into a struct of struct_size bytes, and the size; null is allowed. Programs call
@@ -79,14 +86,21 @@ typedef enum tv_verdict {
 
 /* Why a verdict is not "ok". The values are bits of tv_two_view.reasons. */
 typedef enum tv_reason {
-  /* Fewer than 15 distinct matches are inliers. */
+  /* Fewer than 15 different matches are inliers (of a degenerate pair: were given). Or the pose is
+     too probably wrong (probability_wrong), and what raises that most is that the inliers lie in
+     few places: cells of 32 pixels, or of a 16th of the longer side where it is smaller than 512, a
+     64th where it is larger than 2048. */
   TV_REASON_TOO_FEW_MATCHES = 1 << 0,
-  /* Fewer than 25 % of the matches are inliers, or the residuals are uniform over the threshold, as
-     random matches' are. Matches that can never be inliers (tv_estimate_two_view) are not counted.
-   */
+  /* The pose is too probably wrong, and what raises that most is that certain matches are no
+     inliers, or the residuals are large. Without a full pose: fewer than 25 % of the matches are
+     inliers, or the residuals are uniform over the threshold, as random matches' are. Matches that
+     can never be inliers (tv_estimate_two_view) are not counted. Of tv_reconstruct also: the two
+     images match better when one of them is mirrored. */
   TV_REASON_LOW_INLIER_RATIO = 1 << 1,
   /* The direction of t is poorly determined: the median parallax is below 3 max_error_px or below
-     10 times the noise, or the largest standard deviation of the pose exceeds 1.25 degrees. */
+     10 times the noise, or the largest standard deviation of the pose exceeds 1.25 degrees by the
+     noise alone, or that of the direction 13.5 degrees with the errors that matches share. With two
+     cameras of uncertain focal length (above 0.02), with all that the covariance states. */
   TV_REASON_LOW_PARALLAX = 1 << 2,
   /* The matches lie on a plane, and two different poses explain them equally well. Both are in the
      result. */
@@ -99,12 +113,20 @@ typedef enum tv_reason {
      Something in the scene moves by itself, or this pose is that of the moving object. */
   TV_REASON_SECOND_MOTION = 1 << 6,
   /* The inliers cover fewer than 5 of the 64 cells of an 8x8 grid over each of the two images, or
-     lie on a line in one of them. */
+     lie on a line in one of them. Or the pose is too probably wrong, and what raises that most is
+     that it depends on the inliers of one region of an image. */
   TV_REASON_CROWDED_MATCHES = 1 << 7,
   /* The matched pixels of both images lie on a regular lattice, and either most inliers do, too, or
      a second model fits the other matches: the pose may be wrong by one period of a repeated
-     structure. */
-  TV_REASON_REPEATED_STRUCTURE = 1 << 8
+     structure. Or matches agree on the opposite direction, at least 4 and a tenth as many as the
+     inliers of a clear depth, with more than twice their parallax. tv_reconstruct gives it, too,
+     where most inliers have a second place that looks the same. */
+  TV_REASON_REPEATED_STRUCTURE = 1 << 8,
+  /* The matches contradict the cameras as they were given: the rows of a picture were exposed one
+     after another while the camera turned (a rolling shutter), or its principal point or lens is
+     another one. With cameras that the matches do not contradict, the direction would be another
+     one by more than 10 degrees (camera_direction_rad). */
+  TV_REASON_CAMERA_CONTRADICTED = 1 << 9
 } tv_reason;
 
 /* Returns the name of a kind, such as "calibrated" or "planar_or_panoramic", or "unknown" for any
@@ -126,7 +148,8 @@ typedef struct tv_estimate_options {
   /* The inlier threshold: the largest Sampson distance of an inlier, in pixels of the images as
      given, for every lens alike; (0, 1e9], default 1. The residual of a homography or a rotation
      has two dimensions; its threshold is 1.25 times as large. A bigger value accepts noisier
-     matches and more wrong ones. */
+     matches and more wrong ones. It holds for pixels of sigma 1 (tv_pixel_pairs), and in proportion
+     for others. */
   double max_error_px;
   /* The search stops when the probability of having missed a better model is below 1 - confidence;
      [0, 1), default 0.9999. A bigger value draws more samples. */
@@ -146,11 +169,38 @@ typedef struct tv_estimate_options {
      [0, pi]; 0 (default) means that gravity is not known. With every solver, a pose is refined with
      gravity as a prior; a direction that contradicts the matches counts less. */
   double gravity_sigma_rad;
-  /* The standard deviation of the principal point around (cx, cy), in focal lengths, [0, 0.1],
-     default 0.01; 0 means that it is exactly there. Used only when camera0 and camera1 are equal.
-     The principal point is moved only if the matches contradict (cx, cy) at a significance of
-     0.001. */
+  /* 0 (default): the cameras are exact. Above 0, at most 0.1: the standard deviation of the
+     principal point around (cx, cy), in focal lengths; 0.01 suits a camera whose calibration is
+     doubtful. Used only when camera0 and camera1 are equal. The principal point is moved only if
+     the matches contradict (cx, cy) at a significance of 0.001. */
   double principal_point_sigma;
+  /* How sure the focal lengths of camera0 and camera1 are: the standard deviation of fx and fy, one
+     factor for both, relative to them, [0, 0.5]. 0 (default): they are exact. The covariance grows
+     by what such errors make of the pose, to first order. Where camera0 and camera1 are equal, they
+     are one camera with one error, of the larger sigma; then, above 0.02, the focal length is also
+     refined with the pose, with this deviation as a prior (focal_scale), and the principal point is
+     not moved. 0.005 suits a calibration of unknown quality, 0.1 a focal length from a data
+     sheet. */
+  double focal_sigma0, focal_sigma1;
+  /* How sure (cx, cy) of camera0 and of camera1 are: the standard deviation of each coordinate, in
+     focal lengths, [0, 0.5]. 0 (default): they are exact. The covariance grows as for the focal
+     length; unlike principal_point_sigma, nothing is moved. */
+  double center_sigma0, center_sigma1;
+  /* How far a camera may turn while the sensor reads the rows of a picture, one after another: the
+     standard deviation about each axis, in radians, [0, 0.5]; default 0.02, which is 50 degrees a
+     second in 23 ms. Where the matches contradict cameras that stood still (camera_chi2), the
+     covariance grows by what such a turn, and another principal point, make of the pose, and a pose
+     that would be another one is given TV_REASON_CAMERA_CONTRADICTED. Nothing is corrected. The
+     rows are those of the image as given: of a picture that was turned since, or of a sensor that
+     exposes all rows at once (global shutter), 0 may be stated, which leaves the test out. */
+  double readout_turn_sigma_rad;
+  /* Which attempt at these two images this is, [0, 10000]; 0 (default) means the first. Whoever
+     tries again until the verdict is "ok" gives accident as many chances as there are attempts: the
+     test against chance therefore counts so many times as many models, and the odds that the pose
+     is wrong are so many times as high. tv_reconstruct adds the rungs of effort that it climbed. */
+  int32_t num_trials;
+  /* Must be 0. */
+  int32_t reserved;
 } tv_estimate_options;
 
 /* Writes the default options into a struct of struct_size bytes; null is allowed. Programs call
@@ -195,7 +245,8 @@ typedef struct tv_two_view {
   double alternative_R[9], alternative_t[3];
   /* The covariance of the pose, 5x5, in radians^2, in the order (w0 w1 w2 a b): R_true =
      exp([w]x) R, t_true = normalise(t + a b1 + b b2), b1 = normalise(e_k x t), b2 = t x b1, where k
-     is the index of the smallest |t_k| (the lowest one on a tie). */
+     is the index of the smallest |t_k| (the lowest one on a tie). It grows where more than 30 per
+     cent of the matches are no inliers (docs/algorithms/covariance.md). */
   double covariance[25];
   /* The covariance of the alternative pose, in radians^2 and in the same parameters. */
   double alternative_covariance[25];
@@ -209,16 +260,77 @@ typedef struct tv_two_view {
      rotation was removed; 0 without a full pose. */
   double median_parallax_rad;
   /* The root mean square of the inliers' residuals, in pixels: Sampson distances, or, where the
-     kind is panoramic, planar-or-panoramic or no-motion, transfer errors. */
+     kind is panoramic, planar-or-panoramic or no-motion, transfer errors. Where the matches have
+     sigmas, each residual is in units of its sigma: the value is that of matches of sigma 1. */
   double rms_error_px;
   /* The standard deviation of a matched pixel along one axis, in pixels, estimated from the
-     residuals of a full pose; 0 without one. */
+     residuals of a full pose; 0 without one. Where the matches have sigmas, it is that of a pixel
+     of sigma 1, and sigma times as much for any other. */
   double noise_px;
   /* The seed that was used. */
   uint64_t seed;
-  /* What the estimate adds to (cx, cy) of both cameras, in pixels; it is usually (0, 0). All of the
-     result refers to the cameras with it, which tv_corrected_camera computes. */
+  /* What the estimate adds to (cx, cy) of both cameras, in pixels: (0, 0) unless
+     principal_point_sigma is above 0. All of the result refers to the cameras with it, which
+     tv_corrected_pair computes. */
   double principal_point_shift[2];
+  /* Evidence against (cx, cy) as they were given, whatever principal_point_sigma is: chi-square
+     with two degrees of freedom where they are right, so that it exceeds 13.8 in one pair of a
+     thousand. This field and the next two are 0 where the evidence is not known: where camera0 and
+     camera1 differ, the kind is not TV_KIND_CALIBRATED, or the matches do not determine a shift.
+     Wrong matches and repeated structure are evidence, too: only a shift that many pairs agree on
+     is that of the camera. */
+  double principal_point_chi2;
+  /* The shift of (cx, cy), in pixels, with which the matches' residuals are least, without a
+     prior. It is not applied. */
+  double principal_point_asked_px[2];
+  /* The covariance of principal_point_asked_px, in pixels^2: of x, of x and y, of y. */
+  double principal_point_asked_covariance[3];
+  /* The probability that the pose is wrong, [0, 1]. It is calibrated on real pairs for one event:
+     the rotation is off by more than 5 degrees (docs/verdict.md has the figures). The direction is
+     wrong more often; the covariance says how uncertain both are where the pose is right. 1 where
+     there is no full pose R and t: without cameras, and for the kinds degenerate, panoramic and
+     no-motion. It is at least 0.5 where tv_reconstruct finds a reason in the descriptors: a
+     mirrored image, or a second place that looks the same. The next three fields are the evidence
+     that it is computed from, with noise_px and has_alternative. */
+  double probability_wrong;
+  /* The share of the different matches that are inliers, each weighted by (1 - ratio)^2, [0, 1]:
+     the matches with the most certain descriptors count most. */
+  double agreement;
+  /* By how many radians the rotation turns, to first order, when the inliers of one sixteenth of an
+     image are left out: of the part that turns it most, the mean of both images; [0, pi]. 0 without
+     a full pose. */
+  double region_shift_rad;
+  /* How many cells of 32 pixels hold an inlier, in the image where fewer do (at most 64 cells, at
+     least 16, along the longer side). */
+  int32_t num_places;
+  /* How many of the matches stand still: they keep their pixel, to within twice max_error_px (times
+     the sigma) and at least 2 pixels, while the rest of the picture moves, and no point of the
+     scene can be there at any distance: on-screen text, a frame, a watermark, the vehicle's own
+     legs. They are left out of the estimate and are no inliers. 0 where there are none, without
+     cameras, and where the images differ in size. docs/algorithms/two_view.md, what stands still.
+   */
+  int32_t num_still;
+  /* The factor, without a unit, by which the estimate multiplies fx and fy of both cameras, where
+     the focal length was refined with the pose (focal_sigma0): all of the result refers to the
+     cameras with it, which tv_corrected_pair computes. 0 where the focal length is as given. */
+  double focal_scale;
+  /* The relative standard deviation of the focal length (of camera0's, where the cameras differ)
+     that the covariance contains: what the matches leave of focal_sigma0 where it was refined, else
+     focal_sigma0 as given. 0 where it is taken as exact, or there is no covariance. Bundle
+     adjustment in tv_reconstruct leaves it as it is, though its covariance takes the cameras as
+     exact. */
+  double focal_sigma;
+  /* Evidence of the matches against the cameras as they were given (readout_turn_sigma_rad), or 0
+     where it was not tested: where there is no pose, or it was fitted together with a plane that
+     explains nearly all matches. Above 26.1 (22.5 where camera0 and camera1 differ) the cameras
+     count as contradicted: chi-square with eight (six) degrees of freedom exceeds it in one of a
+     thousand cases, and matches count as a quarter as many, since they share errors. */
+  double camera_chi2;
+  /* The angle in radians by which the rotation would move with cameras that the matches do not
+     contradict; 0 where they do not contradict the given ones. The covariance contains it. */
+  double camera_turn_rad;
+  /* The same of the direction (of t or of the inverse pose's, whichever moves more). */
+  double camera_direction_rad;
 } tv_two_view;
 
 /* Writes zeros into a struct of struct_size bytes, and the size; null is allowed. Programs call
@@ -227,17 +339,21 @@ TV_API void tv_two_view_init_sized(tv_two_view *result, size_t struct_size);
 /* Writes zeros, and struct_size; null is allowed. */
 #define tv_two_view_init(result) tv_two_view_init_sized((result), sizeof *(result))
 
-/* Writes to `corrected` the camera that the result refers to: `camera` with the result's
-   principal_point_shift added to cx and cy. Use it for what follows the estimate: triangulation,
-   guided matching and bundle adjustment. `corrected` may be `camera` itself.
+/* Writes to *pair the cameras and the motion that the result refers to, for what follows the
+   estimate: triangulation, guided matching, bundle adjustment and the dense cloud. Each camera is
+   the given one with the result's principal_point_shift added to cx and cy, and with fx and fy
+   multiplied by its focal_scale where that is above 0. The motion is R and t of the result: zeros
+   where it has none (has_R, has_t), which the functions that need a motion refuse.
+   camera0, camera1: those of the estimate. They may be members of *pair.
    Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE. Thread-safe. */
-TV_API tv_status tv_corrected_camera(const tv_two_view *result, const tv_camera *camera,
-                                     tv_camera *corrected);
+TV_API tv_status tv_corrected_pair(const tv_two_view *result, const tv_camera *camera0,
+                                   const tv_camera *camera1, tv_camera_pair *pair);
 
 /* Estimates the two-view geometry of matched pixels.
    camera0, camera1: both cameras; or both null, which gives F and H only and requires the solver
    eight-point, seven-point or TV_SOLVER_AUTO.
-   pairs: the matched pixels. The order of the matches has no influence on the result. A match is
+   pairs: the matched pixels. The order of the matches has no influence on the result. A match that
+   is given more than once counts once, with the least sum of its sigmas. A match is
    never an inlier if a pixel lies outside its lens's valid region or is not finite, or if the
    absolute values of its four coordinates add up to a million pixels or more.
    options: null means the defaults.
@@ -247,9 +363,9 @@ TV_API tv_status tv_corrected_camera(const tv_two_view *result, const tv_camera 
    inlier_mask: null, or room for pairs->num bytes; a byte is 1 where the match is an inlier of the
    model that the kind names.
    Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS, TV_ERR_CAMERA,
-   TV_ERR_NOT_FINITE (the options only), TV_ERR_OVERLAP. More matches than the context's max_matches
-   are TV_ERR_LIMITS: which of them to leave out is the caller's choice here (tv_reconstruct leaves
-   out those of the highest ratio).
+   TV_ERR_NOT_FINITE (an option or a sigma), TV_ERR_OVERLAP. More matches than the context's
+   max_matches are TV_ERR_LIMITS: which of them to leave out is the caller's choice here
+   (tv_reconstruct leaves out those of the highest ratio).
    Time: at most max_iterations samples, of at most 10 models each, which are scored on all
    matches. */
 TV_API tv_status tv_estimate_two_view(tv_context *context, const tv_camera *camera0,

@@ -1,7 +1,8 @@
 /* twoview: the whole way, from two images in memory to a pose and points.
 
-   It calls the stages in a row; the header of each stage names its sources. Signs and frames:
-   docs/conventions.md. */
+   It calls the stages in a row; the header of each stage names its sources. Views from the side:
+   J.-M. Morel, G. Yu, "ASIFT: a new framework for fully affine invariant image comparison", SIAM J.
+   Imaging Sciences 2(2), 2009; docs/algorithms/effort.md. Signs and frames: docs/conventions.md. */
 #ifndef TWOVIEW_RECONSTRUCT_H
 #define TWOVIEW_RECONSTRUCT_H
 
@@ -21,7 +22,8 @@ typedef struct tv_view {
   uint32_t reserved;
   /* The image. */
   tv_image image;
-  /* The camera of this image; null in both views means uncalibrated, which gives no pose. */
+  /* The camera of this image, of its width and height; null in both views means uncalibrated, which
+     gives no pose. */
   const tv_camera *camera;
   /* Null, or an image of the same size; only corners where its byte is not 0 are kept. */
   const tv_image *mask;
@@ -50,10 +52,41 @@ typedef struct tv_reconstruct_options {
      and helps where few matches pass the ratio test. */
   int32_t guided_matching;
   /* 1: a full pose and the points of its inliers are adjusted together by tv_adjust_two_view with
-     its default options, and R, t, E, F, the covariance and noise_px are those of the adjustment; 0
+     its default options, and R, t, E, F, the covariance and noise_px are those of the adjustment,
+     which takes the cameras as exact, with the focal length as the estimate refined it; 0
      (default): they are those of the estimate, which was measured to be as accurate
      (docs/decisions/0005-bundle.md). */
   int32_t bundle_adjustment;
+  /* How a keypoint's size gives the noise of its position, the exponent of tv_keypoint_sigmas with
+     the feature option keypoint_size as the size of sigma 1: in [0, 2], default 1: in proportion
+     to the size. 0: all keypoints are taken as equally precise. The sigmas serve the estimate and
+     bundle_adjustment. The band of guided_matching stays the same for all, since it is the error of
+     the first pose that makes it wide. */
+  double sigma_by_size;
+  /* 1 (default): before the estimate, one keypoint of each match of tv_match is moved to where the
+     8 x 8 samples around it fit best to those around the other keypoint, under an affine map, a
+     gain and an offset (least-squares matching; A. W. Gruen, South African Journal of
+     Photogrammetry 14(3), 1985), and the sigmas of sigma_by_size are multiplied for this match
+     by what the fit says of its precision (tv_align_matches). It is moved by at most 1.2 times its
+     size over keypoint_size, in pixels, or not at all where the samples do not fit. 0, and for a
+     caller whose struct ends before this field: no keypoint is moved. 1 takes 0.7 microseconds a
+     match on a desktop CPU, and lowers the median error of poses by a fifth
+     (docs/decisions/0026-precision.md). */
+  int32_t align_matches;
+  /* Must be 0. */
+  int32_t reserved;
+  /* The rung of effort to begin with, [0, the context's max_effort]; 0 (default): one view of each
+     image and max_keypoints keypoints in it, N for short. 1: 4 N keypoints, where the image has
+     them. 2: N keypoints, and N / 2 in each of four views that are squeezed by 2, as a plane seen
+     at 60 degrees is, along 0, 45, 90 and 135 degrees. 3: 16 squeezed views, by sqrt(2), 2 and 2
+     sqrt(2), 6.4 N keypoints in all. A higher rung finds matches where a turned wall or a wide
+     baseline leaves too few; docs/algorithms/effort.md has what each gains and takes. */
+  int32_t effort;
+  /* The highest rung that may be climbed to, [0, the context's max_effort]; 0 (default), and any
+     value that is not above `effort`: none but `effort` is run. While the verdict is not "ok" and
+     the evidence says that more could help, the next rung is run; its result replaces that of the
+     one before. Blank or equal pictures and, mostly, unrelated ones end it early. */
+  int32_t max_effort;
 } tv_reconstruct_options;
 
 /* Writes the default options into a struct of struct_size bytes; null is allowed. Programs call
@@ -92,6 +125,16 @@ typedef struct tv_reconstruction {
   /* num_matches points; the status is TV_POINT_INVALID where the match is no inlier, and everywhere
      if there is no full pose. */
   const tv_point *points;
+  /* The rung of effort whose result this is. */
+  int32_t effort;
+  /* How many rungs were run. */
+  int32_t num_rungs;
+  /* The tilt of each keypoint of view 0 and of view 1, for tv_keypoint_shapes: 0 for the image as
+     it is, 1 to 16 for the squeezed views of rungs 2 and 3. */
+  const uint8_t *tilts[2];
+  /* The nanoseconds that each of the rungs that were run took, the first one first; 0 without a
+     clock. */
+  uint64_t rung_ns[4];
 } tv_reconstruction;
 
 /* Writes zeros into a struct of struct_size bytes, and the size; null is allowed. Programs call
@@ -108,13 +151,24 @@ TV_API void tv_reconstruction_init_sized(tv_reconstruction *reconstruction, size
    With guided_matching, the second estimate replaces the first one if it is of the same kind, has
    no fewer inliers and no worse a verdict. Verdict and reasons remain those of the first estimate,
    because matches that were searched along its epipolar lines are no independent evidence for it.
+   An image and a mirrored one may agree on a pose that does not exist. Where the verdict would be
+   "ok" and less than a quarter of the keypoints match, the strongest 512 of each image are
+   therefore matched again, as they are and with the patches of one image mirrored; if more match
+   mirrored, the reason TV_REASON_LOW_INLIER_RATIO is given. A scene that is its own mirror image
+   can still pass, and with upright descriptors (TV_ORIENTATION_UPRIGHT) an image mirrored left to
+   right can.
+   The estimate is given the reason TV_REASON_REPEATED_STRUCTURE where more than half of its inliers
+   have a second nearest descriptor at a squared distance below 20000: then a second place looks the
+   same, as on a wall that one pattern covers. With a max_distance of 141 and below in the options
+   of tv_match that distance is unknown, and the reason is not given for it.
    With bundle_adjustment, exchanged views give the inverse pose up to rounding; without it, bit for
    bit.
    options: null means the defaults.
    two_view: initialised by tv_two_view_init; reconstruction: initialised by tv_reconstruction_init.
    They do not overlap (TV_ERR_OVERLAP).
    Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (an option, or a reserved field that is
-   not 0), and the statuses of the stages. */
+   not 0), TV_ERR_CAMERA (also where the width or height of a view's image is not that of its
+   camera: tv_camera_scale gives the camera of a resized image), and the statuses of the stages. */
 TV_API tv_status tv_reconstruct(tv_context *context, const tv_view *view0, const tv_view *view1,
                                 const tv_reconstruct_options *options, tv_two_view *two_view,
                                 tv_reconstruction *reconstruction);

@@ -39,8 +39,8 @@ typedef struct tv_features {
   uint32_t struct_size;
   /* How many descriptors (and keypoints) there are, [0, the context's max_keypoints]. */
   int32_t num;
-  /* `num` keypoints. tv_match does not read them, and they may be null there; tv_match_guided
-     requires them. */
+  /* `num` keypoints. They may be null for tv_match, which then has no neighbourhoods;
+     tv_match_guided requires them. */
   const tv_keypoint *keypoints;
   /* num x TV_DESCRIPTOR_BYTES bytes; row i describes keypoint i. */
   const uint8_t *descriptors;
@@ -72,7 +72,8 @@ typedef enum tv_normalisation {
 } tv_normalisation;
 
 /* Options of detection and description. Filled by tv_feature_options_init.
-   docs/decisions/0001-features.md has the measurements behind the defaults. */
+   The measurements behind the defaults are in docs/decisions/0001-features.md and
+   docs/accuracy.md. */
 typedef struct tv_feature_options {
   /* The caller's sizeof, set by tv_feature_options_init. */
   uint32_t struct_size;
@@ -82,25 +83,25 @@ typedef struct tv_feature_options {
      grows with the square. */
   int32_t max_keypoints;
   /* How many contiguous pixels of the circle of 16 must all be brighter or all be darker than the
-     centre: 9 (default), 10, 11 or 12 (the FAST-SIFT paper's). A longer arc gives fewer, sharper
+     centre: 9, 10, 11 or 12 (default, and the FAST-SIFT paper's). A longer arc gives fewer, sharper
      corners. */
   int32_t arc;
-  /* The difference in grey levels that these pixels must exceed, [1, 254], default 10. A bigger
+  /* The difference in grey levels that these pixels must exceed, [1, 254], default 15. A bigger
      value gives fewer, stronger corners. */
   int32_t threshold;
   /* 0: the threshold is fixed. Otherwise in [1, threshold], default 3: the threshold is lowered,
      but not below this value, until max_keypoints corners are found. */
   int32_t min_threshold;
-  /* How many levels the pyramid has, [1, 8], default 1. More levels find matches across a change of
+  /* How many levels the pyramid has, [1, 8], default 4. More levels find matches across a change of
      scale. They cost precision, because corners of coarse levels, which are located less precisely,
      take a share of max_keypoints in proportion to the level's area, and what finer levels leave
      unused. */
   int32_t levels;
-  /* The scale factor from a pyramid level to the next, [1.1, 2], default 2. */
+  /* The scale factor from a pyramid level to the next, [1.1, 2], default 1.41. */
   float scale_factor;
-  /* 0 (default): the strongest corners are kept, wherever they are. Otherwise the side of a grid
-     cell in pixels of each level, [8, 16384]: each cell keeps only its share, so that the corners
-     spread over the image. */
+  /* The side of a grid cell in pixels of each level, [8, 16384], default 48: each cell keeps only
+     its share, so that the corners spread over the image. Corners below `threshold` are kept only
+     where there are too few others. 0: the strongest corners are kept, wherever they are. */
   int32_t cell_px;
   /* 1 (default): the position of a corner is refined to a fraction of a pixel; 0: it is that of the
      pixel. */
@@ -112,6 +113,13 @@ typedef struct tv_feature_options {
   /* The size that a corner of level 0 receives, in pixels, [1, 32], default 4. A larger patch is
      more distinctive and is more often disturbed by occlusion and perspective. */
   float keypoint_size;
+  /* 0 (default): a descriptor is the histogram of one window. 1: it is the mean of the histograms
+     of two windows, of 0.7 and 1.3 times its size (J. Dong, S. Soatto, "Domain-size pooling in
+     local descriptors: DSP-SIFT", CVPR 2015). This finds more matches across a change of view or
+     of scale. Descriptors with and without pooling must not be matched with each other. */
+  int32_t pooling;
+  /* Must be 0. */
+  int32_t reserved;
 } tv_feature_options;
 
 /* Writes the default options into a struct of struct_size bytes; null is allowed. Programs call
@@ -135,24 +143,25 @@ TV_API tv_status tv_detect(tv_context *context, const tv_image *image, const tv_
 
 /* Writes the given keypoints with their dominant orientation, as options->orientation selects. A
    keypoint with two orientations is written twice in a row. The order is that of the input, of
-   which x, y and size are read. oriented: room for cap_oriented keypoints; it overlaps no other
-   argument. *num_oriented: how many were written; on TV_ERR_CAPACITY how many there are. Returns
-   the statuses as tv_detect does, and TV_ERR_NOT_FINITE. */
-TV_API tv_status tv_orient(tv_context *context, const tv_image *image,
-                           const tv_feature_options *options, const tv_keypoint *keypoints,
-                           int32_t num_keypoints, tv_keypoint *oriented, int32_t cap_oriented,
-                           int32_t *num_oriented);
+   which x, y and size are read. options: null means the defaults. oriented: room for cap_oriented
+   keypoints; it overlaps no other argument. *num_oriented: how many were written; on
+   TV_ERR_CAPACITY how many there are. Returns the statuses as tv_detect does, and
+   TV_ERR_NOT_FINITE. */
+TV_API tv_status tv_orient(tv_context *context, const tv_image *image, const tv_keypoint *keypoints,
+                           int32_t num_keypoints, const tv_feature_options *options,
+                           tv_keypoint *oriented, int32_t cap_oriented, int32_t *num_oriented);
 
 /* Computes the descriptors of the given keypoints, of which x, y, size and angle_rad are read.
-   descriptors: room for num_keypoints x TV_DESCRIPTOR_BYTES; row i describes keypoint i. A row
-   holds 4 x 4 cells of 8 directions at index (cell_y * 4 + cell_x) * 8 + direction, in the frame
-   that angle_rad turns; directions count counter-clockwise from x as seen in the image. This is the
-   UBC order, which OpenCV and COLMAP use, too. Beyond the image's border, the nearest pixels of the
-   border are repeated. A patch of one grey level gives a descriptor of zeros. Returns TV_ERR_NULL,
-   TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS, TV_ERR_NOT_FINITE, TV_ERR_OVERLAP. */
+   options: null means the defaults. descriptors: room for num_keypoints x TV_DESCRIPTOR_BYTES; row
+   i describes keypoint i. A row holds 4 x 4 cells of 8 directions at index (cell_y * 4 + cell_x) *
+   8 + direction, in the frame that angle_rad turns; directions count counter-clockwise from x as
+   seen in the image. This is the UBC order, which OpenCV and COLMAP use, too. Beyond the image's
+   border, the nearest pixels of the border are repeated. A patch of one grey level gives a
+   descriptor of zeros. Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS,
+   TV_ERR_NOT_FINITE, TV_ERR_OVERLAP. */
 TV_API tv_status tv_describe(tv_context *context, const tv_image *image,
-                             const tv_feature_options *options, const tv_keypoint *keypoints,
-                             int32_t num_keypoints, uint8_t *descriptors);
+                             const tv_keypoint *keypoints, int32_t num_keypoints,
+                             const tv_feature_options *options, uint8_t *descriptors);
 
 /* Detects, orients and describes over one pyramid: tv_detect, tv_orient and tv_describe in one
    call, which is what most programs need. mask, keypoints, *num_keypoints and statuses are as for
@@ -161,6 +170,29 @@ TV_API tv_status tv_describe(tv_context *context, const tv_image *image,
 TV_API tv_status tv_extract(tv_context *context, const tv_image *image, const tv_image *mask,
                             const tv_feature_options *options, tv_keypoint *keypoints,
                             uint8_t *descriptors, int32_t cap_keypoints, int32_t *num_keypoints);
+
+/* Computes how precisely keypoints are located from their sizes, for tv_pixel_pairs: the standard
+   deviation of a position, relative to that of a keypoint of size_of_one pixels, is taken as
+   (size / size_of_one)^exponent, limited to [0.01, 1000].
+   keypoints: num_keypoints; every field is checked as tv_describe checks it. size_of_one: (0,
+   4096], best tv_feature_options.keypoint_size. exponent: [0, 2]; 0 gives 1 for all, 1 a noise in
+   proportion to the size; docs/decisions/0001-features.md has what was measured.
+   sigmas: room for num_keypoints; gather them by the indices of the matches.
+   Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_NOT_FINITE, TV_ERR_OVERLAP. Thread-safe. */
+TV_API tv_status tv_keypoint_sigmas(const tv_keypoint *keypoints, int32_t num_keypoints,
+                                    float size_of_one, double exponent, float *sigmas);
+
+/* Computes how the patches of keypoints lie in the image: shapes[4 k] to shapes[4 k + 3] are a 2 x
+   2 matrix, row-major, whose columns are the x and the y axis of patch k in pixels, each as long as
+   the keypoint's size is in the view that it was found in. A keypoint of the image as it is has
+   size times the rotation by angle_rad; one of a squeezed view has an ellipse of the same area as a
+   circle of its size: its patch is longer along the direction of the view. keypoints:
+   num_keypoints; every field is checked as tv_describe checks it. tilts: null (all 0), or
+   num_keypoints bytes (tv_reconstruction.tilts). shapes: room for 4 x num_keypoints.
+   Returns TV_ERR_NULL, TV_ERR_ARGUMENT (also a tilt above 16), TV_ERR_NOT_FINITE, TV_ERR_OVERLAP.
+   Thread-safe. */
+TV_API tv_status tv_keypoint_shapes(const tv_keypoint *keypoints, const uint8_t *tilts,
+                                    int32_t num_keypoints, double *shapes);
 
 TV_END_DECLS
 

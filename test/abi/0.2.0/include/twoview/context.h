@@ -41,7 +41,7 @@ typedef enum tv_kernels {
    these purposes alone; every other call that takes a context and is listed here returns
    TV_ERR_LIMITS. Calls that are not listed need no purpose. */
 typedef enum tv_purpose {
-  /* tv_detect, tv_orient, tv_describe and tv_extract. */
+  /* tv_detect, tv_orient, tv_describe, tv_extract and tv_align_matches. */
   TV_PURPOSE_EXTRACT = 1 << 0,
   /* tv_match. */
   TV_PURPOSE_MATCH = 1 << 1,
@@ -52,7 +52,9 @@ typedef enum tv_purpose {
   /* tv_match_guided, and tv_reconstruct with guided_matching. */
   TV_PURPOSE_MATCH_GUIDED = 1 << 4,
   /* tv_adjust_two_view, and tv_reconstruct with bundle_adjustment. */
-  TV_PURPOSE_ADJUST = 1 << 5
+  TV_PURPOSE_ADJUST = 1 << 5,
+  /* tv_estimate_absolute_pose. */
+  TV_PURPOSE_ABSOLUTE_POSE = 1 << 6
 } tv_purpose;
 
 /* The largest inputs that a context is made for. They decide how much memory it needs. Filled by
@@ -74,6 +76,12 @@ typedef struct tv_limits {
   /* Bits of tv_purpose: the calls that the context has memory for; 0 (default) means all of them.
      Fewer purposes need less memory. */
   uint32_t purposes;
+  /* The highest rung of effort that tv_reconstruct may climb to
+     (tv_reconstruct_options.effort and max_effort), [0, 3]; 0 (default): none but rung 0. The
+     context then has memory for the keypoints of these rungs, at most 6.5 max_keypoints of an
+     image, and as many may be given to tv_match and tv_match_guided. It counts only with
+     TV_PURPOSE_RECONSTRUCT. */
+  int32_t max_effort;
 } tv_limits;
 
 /* Writes the default limits into a struct of struct_size bytes; null is allowed. Programs call
