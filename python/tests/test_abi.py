@@ -106,6 +106,14 @@ def test_option_defaults_are_the_librarys(kind):
             assert field.default == pytest.approx(value, rel=1e-6), field.name
 
 
+def test_flags_are_bools_and_nothing_is_reserved():
+    flags = {"subpixel", "pooling", "hold_pose", "correct_camera", "measured_only"}
+    for kind in options._STRUCTS:
+        for field in dataclasses.fields(kind):
+            assert field.name != "reserved", kind.__name__
+            assert isinstance(field.default, bool) == (field.name in flags), field.name
+
+
 def test_limits_and_reconstruct_defaults_are_the_librarys():
     def defaults(function):
         return {name: p.default for name, p in inspect.signature(function).parameters.items()}

@@ -35,11 +35,11 @@ class FeatureOptions:
     scale_factor: float = 1.41  #: ratio of sizes of neighbouring pyramid levels, [1.1, 2]
     #: Side of the grid cells that share out the corners, pixels; 0: the strongest corners anywhere.
     cell_px: int = 48
-    subpixel: int = 1  #: 1: positions are refined to a fraction of a pixel
+    subpixel: bool = True  #: positions are refined to a fraction of a pixel
     orientation: int = Orientation.GRADIENT  #: an Orientation: of the patch that is described
     descriptor: int = Normalisation.ROOTSIFT  #: a Normalisation
     keypoint_size: float = 4.0  #: diameter of a keypoint at level 0, pixels
-    pooling: int = 0  #: 1: a descriptor is the mean over windows of 0.7 and 1.3 times its size
+    pooling: bool = False  #: a descriptor is the mean over windows of 0.7 and 1.3 times its size
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ class BundleOptions:
     loss: int = Loss.CAUCHY  #: a Loss
     loss_scale_px: float = 1.0  #: scale of the loss, pixels; a smaller one trusts outliers less
     max_iterations: int = 50  #: most steps, [0, 1000]
-    hold_pose: int = 0  #: 1: only the points are adjusted
+    hold_pose: bool = False  #: only the points are adjusted
 
 
 @dataclass(frozen=True)

@@ -51,12 +51,14 @@ def add_options(parser, kinds=_KINDS, **defaults):
                 continue
             flag = "--" + field.name.replace("_", "-")
             default = defaults.get(field.name, _EXPLICIT.get(field.name, field.default))
+            is_flag = isinstance(field.default, bool)  # 0 or 1 on the command line
+            default = int(default) if is_flag else default
             if field.name in _CHOICES:
                 enum = _CHOICES[field.name]
                 group.add_argument(flag, type=_choice(enum), default=enum(default),
                                    metavar="|".join(_words(enum)), help=_spelt(enum(default)))
             else:
-                number = int if field.default is None else type(field.default)
+                number = int if field.default is None or is_flag else type(field.default)
                 group.add_argument(flag, type=number, default=default,
                                    metavar="N" if number is int else "X",
                                    help="the library's" if field.default is None else
