@@ -1,8 +1,8 @@
 /* What visual odometry says of a frame, as an estimate of the body's pose and motion.
 
-   tv_odometry_state.covariance is that of (w, d) with x_true = exp([w]x) x + d for a point x of the
-   camera, so the camera's place errs by -R d and its attitude by the turn -R w about the world's
-   axes, R = world_from_cam. */
+   tv_odometry_state.cam_from_world_covariance is that of (w, d) with x_true = exp([w]x) x + d for a
+   point x of the camera, so the camera's place errs by -R d and its attitude by the turn -R w about
+   the world's axes, R = world_from_cam. */
 #include "twoview_drivers/mavlink/estimate.h"
 
 #include <math.h>
@@ -160,7 +160,7 @@ static int is_usable(const tv_odometry_state *s) {
   double sum = fabs(s->scale_sigma);
   int k;
   for (k = 0; k < 3; ++k) sum += fabs(s->world_from_cam_t[k]);
-  for (k = 0; k < 36 && s->has_covariance; ++k) sum += fabs(s->covariance[k]);
+  for (k = 0; k < 36 && s->has_covariance; ++k) sum += fabs(s->cam_from_world_covariance[k]);
   return is_rotation(s->world_from_cam_R) && sum < 1e6;
 }
 
@@ -340,7 +340,7 @@ static void add_way(tvm_estimator *e, const tvm_track *track) {
 static void keep_pose(tvm_estimator *e, const tvm_track *track) {
   const tv_odometry_state *s = track->state;
   const tvm_estimator_options *o = &e->options;
-  const double *C = s->covariance, *t = s->world_from_cam_t;
+  const double *C = s->cam_from_world_covariance, *t = s->world_from_cam_t;
   e->last_place_sq = 3 * o->drift_share * o->drift_share * e->path_m * e->path_m +
                      s->scale_sigma * s->scale_sigma * length_sq(t) +
                      (s->has_covariance ? C[21] + C[28] + C[35] : LEAST_JUMP_M * LEAST_JUMP_M);
@@ -348,7 +348,7 @@ static void keep_pose(tvm_estimator *e, const tvm_track *track) {
                     (s->has_covariance ? C[0] + C[7] + C[14] : LEAST_JUMP_RAD * LEAST_JUMP_RAD);
   memcpy(e->last_R, s->world_from_cam_R, sizeof e->last_R);
   memcpy(e->last_t, s->world_from_cam_t, sizeof e->last_t);
-  memcpy(e->last_covariance, s->covariance, sizeof e->last_covariance);
+  memcpy(e->last_covariance, s->cam_from_world_covariance, sizeof e->last_covariance);
   e->has_last_covariance = s->has_covariance;
   e->has_last = 1;
 }
@@ -364,7 +364,7 @@ static void estimate_of(tvm_estimator *e, const tvm_track *track, tvm_estimate *
             has_previous(track) ? track->previous_t : e->last_t, last_R, last_p);
   out->has_covariance = s->has_covariance && e->has_last_covariance;
   if (out->has_covariance) {
-    body_covariance(e, s->world_from_cam_R, R, s->covariance, now);
+    body_covariance(e, s->world_from_cam_R, R, s->cam_from_world_covariance, now);
     body_covariance(e, e->last_R, last_R, e->last_covariance, last);
   }
   add_velocity(e, track, R, p, now, last_R, last_p, last, out);

@@ -40,7 +40,7 @@ class OdometryState:
     reference_t: Optional[np.ndarray]  #: (3,)
     R: Optional[np.ndarray]  #: (3, 3), world_from_cam
     t: Optional[np.ndarray]  #: (3,), the camera's position in the unit of the map
-    covariance: Optional[np.ndarray]  #: (6, 6): w0 w1 w2 d0 d1 d2 of absolute_pose.h
+    covariance: Optional[np.ndarray]  #: (6, 6), of cam_from_world: w0 w1 w2 d0 d1 d2
     noise_px: float  #: of a pixel of sigma 1, one standard deviation
     scale_source: ScaleSource  #: where the unit of lengths comes from
     scale_sigma: Optional[float]  #: relative; None where the unit is not the metre
@@ -255,7 +255,7 @@ def _state(s: Any) -> OdometryState:
         _matrix(s.reference_from_cam_t, 3) if posed else None,
         _matrix(s.world_from_cam_R, 3, 3) if posed else None,
         _matrix(s.world_from_cam_t, 3) if posed else None,
-        _matrix(s.covariance, 6, 6) if s.has_covariance else None, s.noise_px, scale,
+        _matrix(s.cam_from_world_covariance, 6, 6) if s.has_covariance else None, s.noise_px, scale,
         s.scale_sigma if scale != ScaleSource.UNIT else None,
         _matrix(s.principal_point_shift_px, 2), bool(s.scale_contradicted),
         (s.height_scale, s.height_scale_sigma) if s.height_scale_sigma > 0 else None,

@@ -84,10 +84,10 @@ static void set_place(double x, double y, double z) {
 
 static void set_covariance(double angle, double place) {
   int k;
-  memset(state.covariance, 0, sizeof state.covariance);
+  memset(state.cam_from_world_covariance, 0, sizeof state.cam_from_world_covariance);
   for (k = 0; k < 3; ++k) {
-    state.covariance[7 * k] = angle * angle;
-    state.covariance[7 * (k + 3)] = place * place;
+    state.cam_from_world_covariance[7 * k] = angle * angle;
+    state.cam_from_world_covariance[7 * (k + 3)] = place * place;
   }
   state.has_covariance = 1;
 }
@@ -224,7 +224,7 @@ static void check_covariance(int world) {
     for (j = 0; j < 6; ++j)
       for (k = 0; k < 6; ++k)
         for (l = 0; l < 6; ++l) expected[6 * i + j] += J[6 * i + k] * C[6 * k + l] * J[6 * j + l];
-  memcpy(state.covariance, C, sizeof C);
+  memcpy(state.cam_from_world_covariance, C, sizeof C);
   state.has_covariance = 1;
   measured(R, t, none, unused);
   TEST_ASSERT_EQUAL_INT(1, estimate.has_covariance);
@@ -350,7 +350,7 @@ static void test_what_is_not_known_is_not_sent(void) {
 
 static void test_a_number_that_is_not_finite_is_not_sent(void) {
   double *const places[] = {&state.world_from_cam_R[4], &state.world_from_cam_t[2],
-                            &state.covariance[7], &state.scale_sigma};
+                            &state.cam_from_world_covariance[7], &state.scale_sigma};
   const double wrong[] = {NAN, INFINITY, 1e30};
   size_t k, i;
   begin();

@@ -140,7 +140,7 @@ void send_track(Vehicle* v, tvm_session* session, tvm_estimator* estimator, int6
   const double mount[9] = {0, 0, 1, 1, 0, 0, 0, 1, 0};
   for (int k = 0; k < 9; ++k) state.world_from_cam_R[k] = mount[k];
   if (b->raw<uint8_t>() > 240) state.world_from_cam_R[0] = b->wild(-7, 7);
-  for (int k = 0; k < 6; ++k) state.covariance[7 * k] = std::fabs(b->wild(-12, 7));
+  for (int k = 0; k < 6; ++k) state.cam_from_world_covariance[7 * k] = std::fabs(b->wild(-12, 7));
   state.scale_sigma = b->wild(-7, 7);
   tvm_track track{};
   track.struct_size = sizeof track;

@@ -108,7 +108,7 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     FUZZ_REQUIRE(state.num_points <= options.max_points);
     FUZZ_REQUIRE(fuzz::all_finite(state.world_from_cam_R, 9));
     FUZZ_REQUIRE(fuzz::all_finite(state.world_from_cam_t, 3));
-    FUZZ_REQUIRE(fuzz::all_finite(state.covariance, 36));
+    FUZZ_REQUIRE(fuzz::all_finite(state.cam_from_world_covariance, 36));
   }
   for (void* block : memory) std::free(block);
   return 0;

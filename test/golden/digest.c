@@ -646,7 +646,7 @@ static void digest_odometry(const pair *p, tv_context *context) {
     add_int(state.num_inliers);
     add_doubles(state.world_from_cam_R, 9);
     add_doubles(state.world_from_cam_t, 3);
-    add_doubles(state.covariance, 36);
+    add_doubles(state.cam_from_world_covariance, 36);
   }
   /* Of a real picture the flight may not begin; that of the rendered scene does. */
   if (strcmp(p->name, "scene") == 0 && state.num_keyframes < 3) fail("no map", TV_OK);

@@ -127,7 +127,8 @@ void test_frames_are_weak_while_the_keyframes_turns_are_unsure_together() {
       if (state.is_keyframe) {
         ++num_keyframes;
         double largest_sq = 0;
-        for (int k = 0; k < 3; ++k) largest_sq = fmax(largest_sq, state.covariance[7 * k]);
+        for (int k = 0; k < 3; ++k)
+          largest_sq = fmax(largest_sq, state.cam_from_world_covariance[7 * k]);
         sum_sq += largest_sq;
       }
       TEST_ASSERT_DOUBLE_WITHIN(1e-15, sum_sq, odometry->drift_sq);

@@ -184,9 +184,10 @@ typedef struct tv_odometry_state {
   uint8_t relocated;
   /* 1 where a loop was closed at this frame: the keyframes moved. */
   uint8_t loop_closed;
-  /* 1 where world_from_cam and the fields up to `covariance` hold a pose; else they are 0. */
+  /* 1 where world_from_cam and the fields up to cam_from_world_covariance hold a pose; else they
+     are 0. */
   uint8_t has_pose;
-  /* 1 where `covariance` was estimated. */
+  /* 1 where cam_from_world_covariance was estimated. */
   uint8_t has_covariance;
   /* 1 where the frame's attitude contradicts the map's vertical and was left out of account. */
   uint8_t attitude_ignored;
@@ -213,9 +214,10 @@ typedef struct tv_odometry_state {
      of the map; row-major. The world is the camera's frame at the segment's first keyframe, or,
      where attitudes were given, upright: with its z axis along gravity. */
   double world_from_cam_R[9], world_from_cam_t[3];
-  /* The covariance of cam_from_world as this frame alone determines it from the points of the map,
-     in the parameters of tv_absolute_pose.covariance, row-major 6x6. */
-  double covariance[36];
+  /* The covariance of cam_from_world, the inverse of the pose above, as this frame alone determines
+     it from the points of the map, in the parameters of tv_absolute_pose.covariance: x_true =
+     exp([w]x) x + d for a point x in the frame of the camera; row-major 6x6. */
+  double cam_from_world_covariance[36];
   /* The standard deviation of a pixel of sigma 1 along one axis, in pixels. */
   double noise_px;
   /* A tv_scale_source. */

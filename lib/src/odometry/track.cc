@@ -327,7 +327,7 @@ void write_fit(const PoseFit& fit, tv_odometry_state* state) {
   state->num_matches = fit.estimate.num_matches;
   state->num_inliers = fit.estimate.num_inliers;
   state->has_covariance = fit.estimate.has_covariance;
-  std::copy_n(fit.estimate.covariance, 36, state->covariance);
+  std::copy_n(fit.estimate.covariance, 36, state->cam_from_world_covariance);
   state->noise_px = fit.estimate.noise_px;
   state->reasons = fit.estimate.reasons;
 }
