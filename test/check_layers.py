@@ -27,8 +27,9 @@ LAYERS = {
                  "base"},
     "dense": {"triangulation", "geometry", "kernels", "base"},
     "room": {"geometry", "base"},
-    "api": {"room", "dense", "odometry", "adjust", "pose", "match", "robust", "feature", "image",
-            "triangulation", "geometry", "kernels", "base"},
+    "pipeline": {"robust", "geometry", "kernels", "base"},
+    "api": {"pipeline", "room", "dense", "odometry", "adjust", "pose", "match", "robust", "feature",
+            "image", "triangulation", "geometry", "kernels", "base"},
 }
 WITHOUT_EIGEN = {"base", "kernels", "image", "feature", "match"}
 WITHOUT_PIXELS = {"geometry", "triangulation", "robust", "pose", "adjust"}

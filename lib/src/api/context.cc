@@ -1,5 +1,5 @@
 // The entry points of the context: its limits, its size, its kernels, its memory and its times.
-#include "api/context.h"
+#include "pipeline/context.h"
 
 #include <algorithm>
 

@@ -2,7 +2,7 @@
 // effort.
 #pragma once
 
-#include "api/context.h"
+#include "pipeline/context.h"
 #include "twoview/feature.h"
 
 namespace tv {

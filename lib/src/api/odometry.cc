@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "api/context.h"
 #include "api/sized.h"
 #include "api/validate.h"
 #include "api/within.h"
@@ -17,6 +16,7 @@
 #include "odometry/metric.h"
 #include "odometry/still.h"
 #include "odometry/track.h"
+#include "pipeline/context.h"
 #include "twoview/match.h"
 #include "twoview/triangulate.h"
 

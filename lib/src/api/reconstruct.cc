@@ -39,6 +39,7 @@ struct Results {
   tv_point* points;
   tv_correspondence* more_matches;  // the matches of tv_match and of guided matching together
   uint8_t* more_inlier_mask;
+  tv_two_view* more_estimate;  // the estimate from both together
   // Of each keypoint of view 0, the byte of tv_align_matches of its match, or 0. It lies where
   // `points` lies, and is valid until there are points.
   uint8_t* aligned;
@@ -67,6 +68,7 @@ Results alloc_results(Arena& arena, const tv_limits& limits) {
   r.more_matches = arena_alloc<tv_correspondence>(arena, n);
   r.more_inlier_mask = arena_alloc<uint8_t>(arena, m);
   r.pair = arena_alloc<tv_camera_pair>(arena, 1);
+  r.more_estimate = arena_alloc<tv_two_view>(arena, 1);
   // A rung has at most 6.5 times max_keypoints, and there are at least max_keypoints points.
   static_assert(sizeof(tv_point) >= 7 * sizeof *r.aligned, "the points' memory is large enough");
   r.aligned = reinterpret_cast<uint8_t*>(r.points);
@@ -288,7 +290,8 @@ __attribute__((noinline)) tv_status match_along_lines(tv_context* context, const
   }
   const int32_t left_out = keep_best(r.more_matches, limits.max_matches, &count);
   gather_pixels(r, r.more_matches, count);
-  tv_two_view again = *estimate;
+  tv_two_view& again = *r.more_estimate;
+  again = *estimate;
   attempt.evidence = Evidence{};
   status = estimate_two_view(context, task.views[0].camera, task.views[1].camera, &r.pairs,
                              &task.estimate, &again, r.more_inlier_mask, &attempt.evidence);

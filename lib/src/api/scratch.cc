@@ -44,7 +44,8 @@ size_t reconstruct_result_bytes(const tv_limits& limits) {
   return 2 * (arena_bytes<tv_keypoint>(n) + arena_bytes<uint8_t>(n * TV_DESCRIPTOR_BYTES) + tilts +
               arena_bytes<double>(2 * m) + arena_bytes<float>(m)) +
          2 * (arena_bytes<tv_correspondence>(n) + arena_bytes<uint8_t>(m)) +
-         arena_bytes<tv_point>(m) + arena_bytes<float>(m) + arena_bytes<tv_camera_pair>(1);
+         arena_bytes<tv_point>(m) + arena_bytes<float>(m) + arena_bytes<tv_camera_pair>(1) +
+         arena_bytes<tv_two_view>(1);
 }
 
 // The bytes that extract_rung (api/extract.h) takes.

@@ -1,21 +1,17 @@
-// The entry points of two-view estimation: they validate, choose the canonical order of the views,
-// run the search and the finish, and write the result in the caller's order, with the judgement of
-// robust/verdict.h.
+// The entry points of two-view estimation: they validate, call pipeline/two_view.h, and write the
+// result in the caller's order, with the judgement of robust/verdict.h.
 #include "api/two_view.h"
 
 #include <algorithm>
 #include <cstddef>
 #include <cstring>
-#include <new>
-#include <utility>
 
 #include "api/sized.h"
 #include "api/validate.h"
 #include "base/math.h"
+#include "geometry/essential.h"
+#include "pipeline/two_view.h"
 #include "robust/covariance.h"
-#include "robust/place_focal_length.h"
-#include "robust/still.h"
-#include "robust/two_view.h"
 
 namespace tv {
 namespace {
@@ -86,52 +82,6 @@ tv_status read_estimate_options(const tv_estimate_options* options, bool calibra
              : check_gravity(checked->gravity0, checked->gravity1, checked->gravity_sigma_rad);
 }
 
-uint32_t bits_of(float x) {
-  uint32_t bits;
-  std::memcpy(&bits, &x, sizeof bits);
-  return bits;
-}
-
-uint64_t hash_of(const double* a, const double* b) {
-  const double values[4] = {a[0], a[1], b[0], b[1]};
-  uint64_t hash = 0;
-  for (double value : values) {
-    const double positive_zero = value + 0.0;
-    uint64_t bits;
-    std::memcpy(&bits, &positive_zero, sizeof bits);
-    hash = (hash ^ bits) * 0x9e3779b97f4a7c15ULL;
-    hash ^= hash >> 29;
-  }
-  return hash;
-}
-
-// Whether the two views are exchanged for the computation. The choice depends neither on which view
-// the caller names first nor on the order of the matches, so that both calls compute the same
-// result. The pixels decide; where every match occurs in both directions, the cameras, then the
-// matches' ratios and sigmas, then gravity. Where all of these are equal, both calls are the same
-// problem.
-bool exchanged(const tv_camera* camera0, const tv_camera* camera1, const TwoViewProblem& named) {
-  for (const bool with_ratios : {false, true}) {
-    uint64_t forward = 0, backward = 0;
-    for (int i = 0; i < named.num; ++i) {
-      // What an own view's sigma adds to the weight, and the other view's; 0 for sigmas of 1.
-      uint64_t ratio = 0, sigma[2] = {0, 0};
-      if (with_ratios && named.ratios != nullptr) ratio = bits_of(named.ratios[i]);
-      for (int v = 0; with_ratios && v < 2; ++v) {
-        sigma[v] = bits_of(static_cast<float>(named.sigma(v, i))) ^ bits_of(1.0f);
-      }
-      const double *a = named.pixels[0] + 2 * i, *b = named.pixels[1] + 2 * i;
-      forward += hash_of(a, b) * (2 * (ratio + (sigma[0] << 32) + 3 * sigma[1]) + 1);
-      backward += hash_of(b, a) * (2 * (ratio + (sigma[1] << 32) + 3 * sigma[0]) + 1);
-    }
-    if (forward != backward) return forward > backward;
-    const int cameras = camera0 == nullptr ? 0 : std::memcmp(camera0, camera1, sizeof(tv_camera));
-    if (cameras != 0) return cameras > 0;
-  }
-  const tv_estimate_options& options = named.options;
-  return std::memcmp(options.gravity0, options.gravity1, sizeof options.gravity0) > 0;
-}
-
 void store(const Mat3& m, double out[9]) {
   for (int k = 0; k < 9; ++k) out[k] = m(k / 3, k % 3);
 }
@@ -177,142 +127,99 @@ void pack_covariance(const Pose& pose, const Pose& inverse, const double covaria
   }
 }
 
+// The pose, its covariance, E, and the second motion of a plane, in the caller's order.
+void pack_pose(const PairEstimate& estimate, tv_two_view* packed) {
+  const TwoViewOutcome& outcome = estimate.outcome;
+  const bool swapped = estimate.swapped;
+  const Pose& pose = outcome.epipolar.pose;
+  const Pose inverse = inverse_pose(pose);
+  for (int k = 0; k < 3; ++k) packed->t[k] = swapped ? inverse.t[k] : pose.t[k];
+  const Mat3 E = essential_from_pose(pose).normalized();
+  packed->has_E = 1;
+  store(swapped ? Mat3(E.transpose()) : E, packed->E);
+  packed->has_covariance = outcome.has_covariance;
+  if (outcome.has_covariance) {
+    pack_covariance(pose, inverse, outcome.covariance, swapped, packed->covariance);
+  }
+  packed->camera_chi2 = outcome.misfit.chi2;
+  packed->camera_turn_rad = outcome.misfit.turn_rad;
+  packed->camera_direction_rad = outcome.misfit.direction_rad;
+  packed->region_shift_rad = outcome.evidence->region_shift_rad;
+  if (!outcome.evidence->has_alternative) return;
+  const Pose other = swapped ? inverse_pose(outcome.alternative) : outcome.alternative;
+  packed->has_alternative = 1;
+  store(other.R, packed->alternative_R);
+  for (int k = 0; k < 3; ++k) packed->alternative_t[k] = other.t[k];
+  packed->has_alternative_covariance = outcome.has_alternative_covariance;
+  if (outcome.has_alternative_covariance) {
+    pack_covariance(outcome.alternative, other, outcome.alternative_covariance, swapped,
+                    packed->alternative_covariance);
+  }
+}
+
+// F and H, of pixels.
+void pack_matrices(const PairEstimate& estimate, tv_two_view* packed) {
+  const TwoViewOutcome& outcome = estimate.outcome;
+  const Matches& matches = estimate.matches;
+  const Mat3 inverse0 = inverse_intrinsics(matches.intrinsics[0]);
+  if (outcome.has_t || outcome.evidence->kind == TV_KIND_UNCALIBRATED) {
+    const Mat3 inverse1 = inverse_intrinsics(matches.intrinsics[1]);
+    const Mat3 F = (inverse1.transpose() * outcome.epipolar.M * inverse0).normalized();
+    packed->has_F = 1;
+    store(estimate.swapped ? Mat3(F.transpose()) : F, packed->F);
+  }
+  if (outcome.has_H) {
+    const Mat3 forward = matches.intrinsics[1] * outcome.H * inverse0;
+    Mat3 H = estimate.swapped ? adjugate(forward) : forward;
+    packed->has_H = scale_homography(&H);
+    if (packed->has_H) store(H, packed->H);
+  }
+}
+
 // Not inlined, so that its stack frame is not in use during the search.
-__attribute__((noinline)) void pack(const TwoViewProblem& problem, const Matches& matches,
-                                    const TwoViewModel& model, const TwoViewOutcome& outcome,
-                                    bool swapped, int num_still, tv_two_view* result) {
+__attribute__((noinline)) void pack(const PairEstimate& estimate, tv_two_view* result) {
+  const TwoViewProblem& problem = estimate.problem;
+  const TwoViewOutcome& outcome = estimate.outcome;
+  const Evidence& evidence = *outcome.evidence;
   tv_two_view packed{};
-  packed.num_still = num_still;
-  packed.kind = outcome.evidence->kind;
-  packed.agreement = outcome.evidence->agreement;
-  if (outcome.has_t) packed.region_shift_rad = outcome.evidence->region_shift_rad;
-  packed.num_places = std::min(outcome.evidence->num_places[0], outcome.evidence->num_places[1]);
+  packed.num_still = estimate.num_still;
+  packed.kind = evidence.kind;
+  packed.agreement = evidence.agreement;
+  packed.num_places = std::min(evidence.num_places[0], evidence.num_places[1]);
   packed.num_matches = problem.num;
-  packed.num_inliers = outcome.evidence->num_inliers;
-  packed.num_iterations = model.num_iterations;
+  packed.num_inliers = evidence.num_inliers;
+  packed.num_iterations = estimate.model.num_iterations;
   packed.seed = problem.options.seed;
   packed.essential_inliers = outcome.essential_inliers;
   packed.fundamental_inliers = outcome.fundamental_inliers;
   packed.homography_inliers = outcome.homography_inliers;
   packed.rotation_inliers = outcome.rotation_inliers;
-  packed.median_parallax_rad = outcome.evidence->median_parallax_rad;
+  packed.median_parallax_rad = evidence.median_parallax_rad;
   packed.rms_error_px = outcome.rms_error_px;
-  packed.noise_px = outcome.evidence->noise_px;
+  packed.noise_px = evidence.noise_px;
   for (int k = 0; k < 2; ++k) {
     packed.principal_point_shift[k] = outcome.principal_point_shift_px[k];
   }
-  if (outcome.evidence->kind == TV_KIND_CALIBRATED) {
+  if (evidence.kind == TV_KIND_CALIBRATED) {
     const PrincipalPointTest& test = outcome.principal_point_test;
     packed.principal_point_chi2 = test.chi2;
     std::memcpy(packed.principal_point_asked_px, test.asked_px, sizeof test.asked_px);
     std::memcpy(packed.principal_point_asked_covariance, test.covariance, sizeof test.covariance);
   }
-  if (outcome.has_t) {
-    packed.camera_chi2 = outcome.misfit.chi2;
-    packed.camera_turn_rad = outcome.misfit.turn_rad;
-    packed.camera_direction_rad = outcome.misfit.direction_rad;
-  }
-  packed.coverage = coverage_of(*outcome.evidence);
+  packed.coverage = coverage_of(evidence);
   packed.focal_scale = outcome.focal_scale;
   packed.focal_sigma = outcome.focal_sigma;
   if (outcome.has_covariance && !problem.one_camera) {
-    packed.focal_sigma = swapped ? problem.options.focal_sigma1 : problem.options.focal_sigma0;
+    packed.focal_sigma =
+        estimate.swapped ? problem.options.focal_sigma1 : problem.options.focal_sigma0;
   }
-  const Pose& pose = outcome.epipolar.pose;
+  const Mat3& R = outcome.epipolar.pose.R;
   packed.has_R = outcome.has_R;
   packed.has_t = outcome.has_t;
-  if (outcome.has_R) store(swapped ? Mat3(pose.R.transpose()) : pose.R, packed.R);
-  const Mat3 inverse0 = inverse_intrinsics(matches.intrinsics[0]);
-  const Mat3 inverse1 = inverse_intrinsics(matches.intrinsics[1]);
-  if (outcome.has_t) {
-    const Pose inverse = inverse_pose(pose);
-    for (int k = 0; k < 3; ++k) packed.t[k] = swapped ? inverse.t[k] : pose.t[k];
-    const Mat3 E = essential_from_pose(pose).normalized();
-    packed.has_E = 1;
-    store(swapped ? Mat3(E.transpose()) : E, packed.E);
-    packed.has_covariance = outcome.has_covariance;
-    if (outcome.has_covariance) {
-      pack_covariance(pose, inverse, outcome.covariance, swapped, packed.covariance);
-    }
-    if (outcome.evidence->has_alternative) {
-      const Pose other = swapped ? inverse_pose(outcome.alternative) : outcome.alternative;
-      packed.has_alternative = 1;
-      store(other.R, packed.alternative_R);
-      for (int k = 0; k < 3; ++k) packed.alternative_t[k] = other.t[k];
-      packed.has_alternative_covariance = outcome.has_alternative_covariance;
-      if (outcome.has_alternative_covariance) {
-        pack_covariance(outcome.alternative, other, outcome.alternative_covariance, swapped,
-                        packed.alternative_covariance);
-      }
-    }
-  }
-  if (outcome.has_t || outcome.evidence->kind == TV_KIND_UNCALIBRATED) {
-    const Mat3 F = (inverse1.transpose() * outcome.epipolar.M * inverse0).normalized();
-    packed.has_F = 1;
-    store(swapped ? Mat3(F.transpose()) : F, packed.F);
-  }
-  if (outcome.has_H) {
-    const Mat3 forward = matches.intrinsics[1] * outcome.H * inverse0;
-    Mat3 H = swapped ? adjugate(forward) : forward;
-    packed.has_H = scale_homography(&H);
-    if (packed.has_H) store(H, packed.H);
-  }
+  if (outcome.has_R) store(estimate.swapped ? Mat3(R.transpose()) : R, packed.R);
+  if (outcome.has_t) pack_pose(estimate, &packed);
+  pack_matrices(estimate, &packed);
   write_sized(packed, result);
-}
-
-// Search and finish. The results lie in the arena, and the problem's cameras are those that they
-// refer to.
-void estimate(tv_context* context, TwoViewProblem& problem, Matches* matches, TwoViewModel* model,
-              TwoViewOutcome* outcome) {
-  {
-    StageTimer timer(context, TV_STAGE_ESTIMATE);
-    prepare_matches(problem, context->arena, matches);
-    if (problem.calibrated && has_uncertain_focal_length(problem)) {
-      search_focal_length(problem, matches, context->arena, model);
-    } else {
-      search_two_view(problem, *matches, context->arena, model);
-    }
-  }
-  StageTimer timer(context, TV_STAGE_REFINE);
-  finish_two_view(problem, *model, context->arena, matches, outcome);
-}
-
-void take_cameras(const tv_camera* const cameras[2], TwoViewProblem& problem) {
-  problem.camera[0] = prepare_camera(*cameras[0]);
-  problem.camera[1] = prepare_camera(*cameras[1]);
-}
-
-// The same without the matches that stand still. cameras: those of the problem. True: the matches
-// are no part of the scene, and `problem` has them left out; else it is as before, and there are no
-// results.
-bool estimate_without_still(tv_context* context, const tv_camera* const cameras[2],
-                            TwoViewProblem& problem, Matches* matches, TwoViewModel* model,
-                            TwoViewOutcome* outcome, int* num_still) {
-  const tv_camera &first = problem.camera[0].model, &second = problem.camera[1].model;
-  if (!problem.calibrated || first.width != second.width || first.height != second.height) {
-    return false;
-  }
-  uint8_t* is_still = arena_alloc<uint8_t>(context->arena, static_cast<size_t>(problem.num));
-  *num_still = find_still_matches(problem, is_still);
-  if (*num_still == 0) return false;
-  const size_t used_bytes = context->arena.used_bytes;
-  problem.is_still = is_still;
-  estimate(context, problem, matches, model, outcome);
-  if (contradicts_still(problem, *matches, *outcome, *num_still)) return true;
-  problem.is_still = nullptr;
-  take_cameras(cameras, problem);
-  problem.focal_log_scale = 0;
-  problem.focal_is_ambiguous = false;
-  context->arena.used_bytes = used_bytes;
-  // In place, since each temporary would lie on the stack, too.
-  new (matches) Matches{};
-  new (model) TwoViewModel{};
-  Evidence* const evidence = outcome->evidence;
-  *evidence = Evidence{};
-  new (outcome) TwoViewOutcome{};
-  outcome->evidence = evidence;
-  *num_still = 0;
-  return false;
 }
 
 // Whether an output shares a byte with another argument. Not inlined, for the same reason.
@@ -347,15 +254,12 @@ tv_status estimate_two_view(tv_context* context, const tv_camera* camera0, const
   tv_status status = read_pixel_pairs(pairs, &given);
   if (status == TV_OK) status = check_sized(result);
   if (status != TV_OK) return status;
-  const double *const pixels0 = given.pixels0, *const pixels1 = given.pixels1;
-  const float* const ratios = given.ratios;
-  const int32_t num_matches = given.num;
   if ((camera0 == nullptr) != (camera1 == nullptr)) return TV_ERR_ARGUMENT;
   const bool calibrated = camera0 != nullptr;
-  TwoViewProblem problem{};
-  status = read_estimate_options(options, calibrated, &problem.options);
+  PairEstimate estimate{};
+  status = read_estimate_options(options, calibrated, &estimate.problem.options);
   if (status != TV_OK) return status;
-  if (num_matches > context->limits.max_matches || !made_for(*context, TV_PURPOSE_ESTIMATE)) {
+  if (given.num > context->limits.max_matches || !made_for(*context, TV_PURPOSE_ESTIMATE)) {
     return TV_ERR_LIMITS;
   }
   if (calibrated) {
@@ -367,51 +271,15 @@ tv_status estimate_two_view(tv_context* context, const tv_camera* camera0, const
     return TV_ERR_OVERLAP;
   }
   ArenaScope scope(context->arena);
-  Matches matches{};
-  TwoViewModel model{};
-  const tv_camera* cameras[2] = {camera0, camera1};
-  bool swapped;
-  {
-    StageTimer timer(context, TV_STAGE_ESTIMATE);
-    problem.pixels[0] = pixels0;
-    problem.pixels[1] = pixels1;
-    problem.ratios = ratios;
-    problem.sigmas[0] = given.sigmas0;
-    problem.sigmas[1] = given.sigmas1;
-    problem.num = num_matches;
-    swapped = exchanged(camera0, camera1, problem);
-    problem.calibrated = calibrated;
-    problem.one_camera = calibrated && std::memcmp(camera0, camera1, sizeof *camera0) == 0;
-    tv_estimate_options& o = problem.options;
-    if (problem.one_camera) {
-      o.focal_sigma0 = o.focal_sigma1 =
-          o.focal_sigma0 > o.focal_sigma1 ? o.focal_sigma0 : o.focal_sigma1;
-      o.center_sigma0 = o.center_sigma1 =
-          o.center_sigma0 > o.center_sigma1 ? o.center_sigma0 : o.center_sigma1;
-    }
-    if (swapped) std::swap(cameras[0], cameras[1]);
-    if (calibrated) {
-      take_cameras(cameras, problem);
-    }
-    if (swapped) {
-      std::swap(problem.pixels[0], problem.pixels[1]);
-      std::swap(problem.sigmas[0], problem.sigmas[1]);
-      std::swap(o.gravity0, o.gravity1);
-      std::swap(o.focal_sigma0, o.focal_sigma1);
-      std::swap(o.center_sigma0, o.center_sigma1);
-    }
-    problem.kernels = tvk_geometry_of(context->kernels);
-  }
-  TwoViewOutcome outcome{};
-  outcome.evidence = evidence;
-  int num_still = 0;
-  if (!estimate_without_still(context, cameras, problem, &matches, &model, &outcome, &num_still)) {
-    estimate(context, problem, &matches, &model, &outcome);
-  }
-  pack(problem, matches, model, outcome, swapped, num_still, result);
+  estimate.outcome.evidence = evidence;
+  estimate_pair(context, camera0, camera1, given, &estimate);
+  pack(estimate, result);
   if (inlier_mask != nullptr) {
-    std::memset(inlier_mask, 0, static_cast<size_t>(num_matches));
-    for (int k = 0; k < matches.num_all; ++k) inlier_mask[matches.order[k]] = outcome.inlier[k];
+    const Matches& matches = estimate.matches;
+    std::memset(inlier_mask, 0, static_cast<size_t>(given.num));
+    for (int k = 0; k < matches.num_all; ++k) {
+      inlier_mask[matches.order[k]] = estimate.outcome.inlier[k];
+    }
   }
   return TV_OK;
 }

@@ -6,8 +6,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "api/context.h"
 #include "base/math.h"
+#include "pipeline/context.h"
 #include "twoview/feature.h"
 #include "twoview/two_view.h"
 
