@@ -135,6 +135,8 @@ struct Task {
 // One rung of effort, and what it found; the arrays are in Results.
 struct Attempt {
   int32_t rung;
+  int32_t num_rungs;                 // how many were run, this one included
+  uint64_t rung_ns[kMaxEffort + 1];  // the time of each
   int32_t num_keypoints[2];
   int32_t num_found;  // matches of tv_match
   int32_t num_matches, num_left_out;
@@ -573,16 +575,31 @@ int32_t next_rung(int32_t rung, int32_t max_effort) {
   return rung == 0 && max_effort >= 2 ? 2 : rung + 1;
 }
 
+// Runs one rung after another, as far as the options allow and a further one could help. *attempt,
+// which is given as Attempt{}, is then the last one.
+tv_status climb(tv_context* context, Task& task, Results& r, Attempt* attempt) {
+  const int32_t max_effort = task.options.max_effort;
+  for (attempt->rung = task.options.effort;; attempt->rung = next_rung(attempt->rung, max_effort)) {
+    const uint64_t start_ns = clock_ns(*context);
+    const tv_status status = run_rung(context, task, r, attempt);
+    if (status != TV_OK) return status;
+    attempt->rung_ns[attempt->num_rungs++] = clock_ns(*context) - start_ns;
+    if (attempt->rung >= max_effort || !could_help(r, *attempt)) return TV_OK;
+    // Each rung's estimate has its chance to agree by accident.
+    int32_t& num_trials = task.estimate.num_trials;
+    num_trials = std::min(std::max(num_trials, 1) + 1, 10000);
+  }
+}
+
 // Not inlined, so that its stack frame is not in use during the estimate.
 __attribute__((noinline)) void write_reconstruction(const Results& r, const Attempt& attempt,
                                                     int32_t num_matches, int32_t num_left_out,
-                                                    int32_t num_points, int32_t num_rungs,
-                                                    const uint64_t rung_ns[kMaxEffort + 1],
+                                                    int32_t num_points,
                                                     tv_reconstruction* reconstruction) {
   tv_reconstruction packed{};
   packed.effort = attempt.rung;
-  packed.num_rungs = num_rungs;
-  for (int k = 0; k < num_rungs; ++k) packed.rung_ns[k] = rung_ns[k];
+  packed.num_rungs = attempt.num_rungs;
+  std::copy_n(attempt.rung_ns, attempt.num_rungs, packed.rung_ns);
   for (int v = 0; v < 2; ++v) {
     packed.tilts[v] = r.tilts[v];
     packed.num_keypoints[v] = attempt.num_keypoints[v];
@@ -642,19 +659,8 @@ tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_vie
   tv::ArenaScope scope(context->arena);
   tv::Results r = tv::alloc_results(context->arena, context->limits);
   tv::Attempt attempt{};
-  uint64_t rung_ns[tv::kMaxEffort + 1] = {};
-  int32_t num_rungs = 0;
-  for (attempt.rung = checked.effort;;
-       attempt.rung = tv::next_rung(attempt.rung, checked.max_effort)) {
-    const uint64_t start_ns = tv::clock_ns(*context);
-    status = tv::run_rung(context, task, r, &attempt);
-    if (status != TV_OK) return status;
-    rung_ns[num_rungs++] = tv::clock_ns(*context) - start_ns;
-    if (attempt.rung >= checked.max_effort || !tv::could_help(r, attempt)) break;
-    // Each rung's estimate has its chance to agree by accident.
-    int32_t& num_trials = task.estimate.num_trials;
-    num_trials = std::min(std::max(num_trials, 1) + 1, 10000);
-  }
+  status = tv::climb(context, task, r, &attempt);
+  if (status != TV_OK) return status;
   int32_t num_matches = attempt.num_matches, num_left_out = attempt.num_left_out, num_points = 0;
   tv_two_view& estimate = attempt.estimate;
   if (checked.guided_matching != 0 && tv::is_full_pose(estimate) && estimate.has_E != 0) {
@@ -670,7 +676,6 @@ tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_vie
   }
   tv::write_judgement(attempt.judgement, &estimate);
   tv::write_sized(estimate, two_view);
-  tv::write_reconstruction(r, attempt, num_matches, num_left_out, num_points, num_rungs, rung_ns,
-                           reconstruction);
+  tv::write_reconstruction(r, attempt, num_matches, num_left_out, num_points, reconstruction);
   return TV_OK;
 }

@@ -40,6 +40,24 @@ void observe_if_near(Odometry* odometry, int32_t keyframe, int32_t keypoint, int
   }
 }
 
+// The newest keyframes before this one with which it makes points, at most kMostNeighbours.
+int32_t list_neighbours(const Odometry& odometry, int32_t keyframe, int32_t* neighbours) {
+  const Map& map = odometry.map;
+  const MapKeyframe& own = map.keyframes[keyframe];
+  int32_t num = 0;
+  for (int32_t k = keyframe - 1; k >= 0 && num < kMostNeighbours; --k) {
+    const MapKeyframe& other = map.keyframes[k];
+    if (other.described < 0 || other.segment != own.segment) continue;
+    if (way_between(other.cam_from_world, own.cam_from_world) <
+        kLeastBaseline * odometry.median_depth) {
+      continue;
+    }
+    if (turn_between(other.cam_from_world, own.cam_from_world) > kMostTurned) continue;
+    neighbours[num++] = k;
+  }
+  return num;
+}
+
 }  // namespace
 
 void make_room(Odometry* odometry, int32_t wanted) {
@@ -174,17 +192,8 @@ void make_points(Odometry* odometry, int32_t keyframe, const Frame& frame, bool 
   tv_correspondence* found = arena_alloc<tv_correspondence>(arena, n);
   const tv_features mine = features_of(map, own, arena_alloc<tv_keypoint>(arena, n));
   tv_keypoint* their_room = arena_alloc<tv_keypoint>(arena, n);
-  int32_t neighbours[kMostNeighbours], num_neighbours = 0;
-  for (int32_t k = keyframe - 1; k >= 0 && num_neighbours < kMostNeighbours; --k) {
-    const MapKeyframe& other = map.keyframes[k];
-    if (other.described < 0 || other.segment != own.segment) continue;
-    if (way_between(other.cam_from_world, own.cam_from_world) <
-        kLeastBaseline * odometry->median_depth) {
-      continue;
-    }
-    if (turn_between(other.cam_from_world, own.cam_from_world) > kMostTurned) continue;
-    neighbours[num_neighbours++] = k;
-  }
+  int32_t neighbours[kMostNeighbours];
+  const int32_t num_neighbours = list_neighbours(*odometry, keyframe, neighbours);
   MapCheck* check = &odometry->check;
   const bool is_first_call = *next == 0;  // only its votes are heeded at once
   // The nearest one is left out: from near by, a wrong motion looks like the right one.

@@ -238,17 +238,24 @@ struct Base {
   int32_t point_id, keyframe_id, segment, frame;
 };
 
-// Reads what follows the header, and adds it to `map` if there is room for the places of its points
-// in `places`; null: it is only checked. False: it is no map. *fits: whether there is room for it.
-bool read_body(const Header& h, Stream* s, int32_t* places, Map* map, const Base& base,
-               bool* fits) {
-  const bool stores = places != nullptr;
-  const MapSizes& sizes = map->sizes;
-  *fits = h.num_points <= sizes.max_points - map->num_points &&
-          h.num_keyframes <= sizes.max_keyframes - map->num_keyframes &&
-          h.num_removed <= max_removed(sizes) && h.next_point_id <= kMost - base.point_id &&
-          h.next_keyframe_id <= kMost - base.keyframe_id &&
-          h.num_segments <= kMost - base.segment && h.num_frames <= kMost - base.frame;
+// What reads the parts of a map's bytes after their header, in this order, and adds them to `map`
+// if there is room for the places of its points in `places`; null: they are only checked. False: it
+// is no map.
+struct BodyReader {
+  const Header& h;
+  Stream* s;
+  int32_t* places;
+  Map* map;
+  const Base& base;
+
+  bool stores() const { return places != nullptr; }
+  bool read_points() const;
+  bool read_keyframe(bool* fits, MapKeyframe* keyframe) const;
+  bool read_keyframes(bool* fits) const;
+  bool read_removed() const;
+};
+
+bool BodyReader::read_points() const {
   int32_t last_id = -1;
   for (int32_t n = 0; n < h.num_points; ++n) {
     MapPoint point{};
@@ -256,61 +263,116 @@ bool read_body(const Header& h, Stream* s, int32_t* places, Map* map, const Base
     pass_point(s, &point, descriptor);
     if (s->is_bad || !is_point(h, point) || point.id <= last_id) return false;
     last_id = point.id;
-    if (!stores) continue;
+    if (!stores()) continue;
     point.id += base.point_id;
     point.segment += base.segment;
     point.made_at += base.keyframe_id;
     places[n] = add_point(map, point.position, descriptor, point.segment);
     map->points[places[n]] = point;
   }
-  last_id = -1;
-  const Stream keyframes = *s;
-  int32_t newest_segment = -1;
+  return true;
+}
+
+// Reads what a keyframe sees, after the keyframe, and adds both.
+bool BodyReader::read_keyframe(bool* fits, MapKeyframe* keyframe) const {
+  *fits = *fits && keyframe->num_keypoints <= map->sizes.max_keypoints;
+  MapKeypoint* own = nullptr;
+  int32_t* seen = nullptr;
+  if (stores()) {
+    keyframe->room = map->free_rooms[--map->num_free_rooms];
+    keyframe->described = -1;
+    keyframe->id += base.keyframe_id;
+    keyframe->segment += base.segment;
+    keyframe->frame += base.frame;
+    map->keyframes[map->num_keyframes++] = *keyframe;
+    own = keypoints_of(*map, *keyframe);
+    seen = seen_by(*map, *keyframe);
+  }
+  for (int32_t k = 0; k < keyframe->num_keypoints; ++k) {
+    MapKeypoint keypoint;
+    int32_t point;
+    pass_keypoint(s, &keypoint, &point);
+    if (s->is_bad || !is_keypoint(h, keypoint, point)) return false;
+    if (!stores()) continue;
+    own[k] = keypoint;
+    seen[k] = kNoPoint;
+    if (point != kNoPoint) observe(map, map->num_keyframes - 1, k, places[point]);
+  }
+  return true;
+}
+
+bool BodyReader::read_keyframes(bool* fits) const {
+  int32_t last_id = -1, newest_segment = -1;
+  const Stream begin = *s;
   for (int32_t n = 0; n < h.num_keyframes; ++n) {
     MapKeyframe keyframe{};
     pass(s, &keyframe, kOfKeyframe);
     if (s->is_bad || !is_keyframe(h, keyframe) || keyframe.id <= last_id) return false;
     last_id = keyframe.id;
     newest_segment = keyframe.segment;
-    *fits = *fits && keyframe.num_keypoints <= sizes.max_keypoints;
-    MapKeypoint* own = nullptr;
-    int32_t* seen = nullptr;
-    if (stores) {
-      keyframe.room = map->free_rooms[--map->num_free_rooms];
-      keyframe.described = -1;
-      keyframe.id += base.keyframe_id;
-      keyframe.segment += base.segment;
-      keyframe.frame += base.frame;
-      map->keyframes[map->num_keyframes++] = keyframe;
-      own = keypoints_of(*map, keyframe);
-      seen = seen_by(*map, keyframe);
-    }
-    for (int32_t k = 0; k < keyframe.num_keypoints; ++k) {
-      MapKeypoint keypoint;
-      int32_t point;
-      pass_keypoint(s, &keypoint, &point);
-      if (s->is_bad || !is_keypoint(h, keypoint, point)) return false;
-      if (!stores) continue;
-      own[k] = keypoint;
-      seen[k] = kNoPoint;
-      if (point != kNoPoint) observe(map, map->num_keyframes - 1, k, places[point]);
-    }
+    if (!read_keyframe(fits, &keyframe)) return false;
   }
-  if (!stores && is_upright_in(keyframes, h, newest_segment) != (h.is_upright != 0)) return false;
-  last_id = -1;
-  const int32_t surplus = map->num_removed + h.num_removed - max_removed(sizes);
-  if (stores && surplus > 0) forget_removed(map, surplus);
+  return stores() || is_upright_in(begin, h, newest_segment) == (h.is_upright != 0);
+}
+
+bool BodyReader::read_removed() const {
+  int32_t last_id = -1;
+  const int32_t surplus = map->num_removed + h.num_removed - max_removed(map->sizes);
+  if (stores() && surplus > 0) forget_removed(map, surplus);
   for (int32_t n = 0; n < h.num_removed; ++n) {
     RemovedKeyframe removed;
     pass(s, &removed, kOfRemoved);
     if (s->is_bad || !is_removed(h, removed) || removed.id <= last_id) return false;
     last_id = removed.id;
-    if (!stores) continue;
+    if (!stores()) continue;
     removed.id += base.keyframe_id;
     removed.kept_id += base.keyframe_id;
     map->removed[map->num_removed++] = removed;
   }
-  return s->at == s->end;
+  return true;
+}
+
+// Reads what follows the header, as BodyReader does. *fits: whether there is room for it.
+bool read_body(const Header& h, Stream* s, int32_t* places, Map* map, const Base& base,
+               bool* fits) {
+  const MapSizes& sizes = map->sizes;
+  *fits = h.num_points <= sizes.max_points - map->num_points &&
+          h.num_keyframes <= sizes.max_keyframes - map->num_keyframes &&
+          h.num_removed <= max_removed(sizes) && h.next_point_id <= kMost - base.point_id &&
+          h.next_keyframe_id <= kMost - base.keyframe_id &&
+          h.num_segments <= kMost - base.segment && h.num_frames <= kMost - base.frame;
+  const BodyReader reader{h, s, places, map, base};
+  return reader.read_points() && reader.read_keyframes(fits) && reader.read_removed() &&
+         s->at == s->end;
+}
+
+// The header but for its number of bytes and its checksum.
+void fill_header(const Odometry& odometry, Header* h) {
+  const Map& map = odometry.map;
+  std::memcpy(h->magic, kMagic, sizeof kMagic);
+  h->version = kVersion;
+  h->camera = camera_of(odometry);
+  h->principal_point[0] = odometry.camera.model.cx;
+  h->principal_point[1] = odometry.camera.model.cy;
+  h->num_points = map.num_points;
+  h->num_keyframes = map.num_keyframes;
+  h->num_removed = map.num_removed;
+  h->next_point_id = map.next_point_id;
+  h->next_keyframe_id = map.next_keyframe_id;
+  static_assert(offsetof(Header, num_loops) - offsetof(Header, num_frames) ==
+                        (kCounts - 1) * sizeof h->num_frames &&
+                    offsetof(Odometry, num_loops) - offsetof(Odometry, num_frames) ==
+                        (kCounts - 1) * sizeof h->num_frames,
+                "they follow each other in both");
+  std::copy_n(&odometry.num_frames, kCounts, &h->num_frames);
+  // Of the last keyframe's segment.
+  const int32_t segment =
+      map.num_keyframes > 0 ? map.keyframes[map.num_keyframes - 1].segment : odometry.segment;
+  h->is_upright = is_upright(map, segment);
+  if (segment == odometry.segment)
+    write_scale(odometry.scale, h);
+  else if (segment == odometry.other_segment)
+    write_scale(odometry.other_scale, h);
 }
 
 }  // namespace
@@ -323,30 +385,7 @@ size_t write_map(const Odometry& odometry, uint8_t* to) {
   int32_t* ranks = arena_alloc<int32_t>(scratch, room);
   rank_points(map, places, ranks);
   Header h{};
-  std::memcpy(h.magic, kMagic, sizeof kMagic);
-  h.version = kVersion;
-  h.camera = camera_of(odometry);
-  h.principal_point[0] = odometry.camera.model.cx;
-  h.principal_point[1] = odometry.camera.model.cy;
-  h.num_points = map.num_points;
-  h.num_keyframes = map.num_keyframes;
-  h.num_removed = map.num_removed;
-  h.next_point_id = map.next_point_id;
-  h.next_keyframe_id = map.next_keyframe_id;
-  static_assert(offsetof(Header, num_loops) - offsetof(Header, num_frames) ==
-                        (kCounts - 1) * sizeof h.num_frames &&
-                    offsetof(Odometry, num_loops) - offsetof(Odometry, num_frames) ==
-                        (kCounts - 1) * sizeof h.num_frames,
-                "they follow each other in both");
-  std::copy_n(&odometry.num_frames, kCounts, &h.num_frames);
-  // Of the last keyframe's segment.
-  const int32_t segment =
-      map.num_keyframes > 0 ? map.keyframes[map.num_keyframes - 1].segment : odometry.segment;
-  h.is_upright = is_upright(map, segment);
-  if (segment == odometry.segment)
-    write_scale(odometry.scale, &h);
-  else if (segment == odometry.other_segment)
-    write_scale(odometry.other_scale, &h);
+  fill_header(odometry, &h);
   Stream s{to, nullptr, 0, 0, false};
   pass(&s, &h, kOfHeader);
   for (int32_t n = 0; n < map.num_points; ++n) {

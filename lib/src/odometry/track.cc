@@ -475,6 +475,17 @@ void clear_state(const Frame& frame, tv_odometry_state* state) {
   state->segment = state->reference_id = -1;
 }
 
+// What the frame was tracked with was wrong.
+void lose_frame(Odometry* odometry, const Frame& frame, tv_odometry_state* state) {
+  const bool is_contrary = (state->map_reasons & TV_MAP_REASON_VELOCITIES_DISAGREE) != 0;
+  clear_state(frame, state);
+  state->map_reasons = is_contrary ? TV_MAP_REASON_VELOCITIES_DISAGREE : TV_MAP_REASON_CONTRADICTED;
+  state->reasons = reasons_of(state->map_reasons);
+  odometry->status = TV_ODOMETRY_LOST;
+  odometry->lost_frames = 1;
+  odometry->has_motion = false;
+}
+
 }  // namespace
 
 bool finish_keyframe(Odometry* odometry, Frame* frame) {
@@ -527,15 +538,8 @@ void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry
     odometry->is_found_again |= state->relocated != 0;
   }
   if (has_pose && !finish_tracked(odometry, fit, follows, input.gap != 0, frame, state)) {
-    // What the frame was tracked with was wrong.
-    const bool is_contrary = (state->map_reasons & TV_MAP_REASON_VELOCITIES_DISAGREE) != 0;
-    clear_state(*frame, state);
-    state->map_reasons =
-        is_contrary ? TV_MAP_REASON_VELOCITIES_DISAGREE : TV_MAP_REASON_CONTRADICTED;
-    state->reasons = reasons_of(state->map_reasons);
-    odometry->status = TV_ODOMETRY_LOST;
-    odometry->lost_frames = 1;
-    odometry->has_motion = has_pose = false;
+    lose_frame(odometry, *frame, state);
+    has_pose = false;
   } else if (!has_pose) {
     odometry->has_motion = false;
     has_pose = has_map && had_pose && follow_turn(odometry, frame);

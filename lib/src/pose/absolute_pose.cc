@@ -399,6 +399,38 @@ int count_inliers(const Finish& f, const Pose& pose, tv_absolute_pose* out, uint
   return different;
 }
 
+// The likelier of a pose and its twin. The other one, where it is possible, too, becomes the
+// alternative.
+const Candidate& better_of(const Finish& f, const Candidate& found, const Candidate& twin,
+                           tv_absolute_pose* out) {
+  if (!twin.determined || !(turn_sq(twin.pose, found.pose) > 1e-6)) return found;
+  const double difference = evidence_against(f, twin, found) - evidence_against(f, found, found);
+  const bool takes_twin = difference < 0;
+  if (std::fabs(difference) < kEvidence) {
+    out->has_alternative = 1;
+    const Candidate& other = takes_twin ? found : twin;
+    write_pose(f.s, other.pose, out->alternative_R, out->alternative_t);
+  }
+  return takes_twin ? twin : found;
+}
+
+// What a pose is judged by. spread: of the points of its different inliers.
+void measure_pose(const Finish& f, const Candidate& best, const Spread& spread, int different,
+                  const tv_absolute_pose& out, AbsoluteEvidence* evidence) {
+  double centre[3];
+  place(best.pose, spread.mean, centre);
+  const double distance = length_of(centre);
+  const double focal = 0.5 * (f.input.camera.model.fx + f.input.camera.model.fy);
+  evidence->has_pose = true;
+  evidence->has_alternative = out.has_alternative != 0;
+  evidence->num_inliers = out.num_inliers;
+  evidence->num_different_inliers = different;
+  evidence->noise_px = best.noise_px;
+  if (best.has_covariance) evidence->sigma_rad = largest_sigma(best, distance);
+  evidence->coverage = out.coverage;
+  evidence->width_px = std::sqrt(spread.svd.s[1] / different) / distance * focal;
+}
+
 // Refinement, twin, inliers and covariance; what the pose is judged by goes to *evidence, which is
 // given as AbsoluteEvidence{}.
 void fit_absolute_pose(const SightingInput& input, const Sightings& s,
@@ -440,17 +472,7 @@ void fit_absolute_pose(const SightingInput& input, const Sightings& s,
   const bool is_flat = sizes[2] < 0.01 * sizes[1];
   const Pose mirror = mirrored(found.pose, spread);
   const Candidate twin = refined(f, is_flat ? &mirror : nullptr);
-  bool takes_twin = false;
-  if (twin.determined && turn_sq(twin.pose, found.pose) > 1e-6) {
-    const double difference = evidence_against(f, twin, found) - evidence_against(f, found, found);
-    takes_twin = difference < 0;
-    if (std::fabs(difference) < kEvidence) {
-      const Candidate& other = takes_twin ? found : twin;
-      out->has_alternative = evidence->has_alternative = true;
-      write_pose(s, other.pose, out->alternative_R, out->alternative_t);
-    }
-  }
-  const Candidate& best = takes_twin ? twin : found;
+  const Candidate& best = better_of(f, found, twin, out);
   out->num_inliers = 0;
   different = count_inliers(f, best.pose, out, mask);
   out->has_pose = 1;
@@ -460,17 +482,7 @@ void fit_absolute_pose(const SightingInput& input, const Sightings& s,
     out->noise_px = best.noise_px;
     store_covariance(s, best, out->covariance);
   }
-  double centre[3];
-  place(best.pose, spread.mean, centre);
-  const double distance = length_of(centre);
-  const double focal = 0.5 * (input.camera.model.fx + input.camera.model.fy);
-  evidence->has_pose = true;
-  evidence->num_inliers = out->num_inliers;
-  evidence->num_different_inliers = different;
-  evidence->noise_px = best.noise_px;
-  if (best.has_covariance) evidence->sigma_rad = largest_sigma(best, distance);
-  evidence->coverage = out->coverage;
-  evidence->width_px = std::sqrt(sizes[1] / different) / distance * focal;
+  measure_pose(f, best, spread, different, *out, evidence);
 }
 
 }  // namespace

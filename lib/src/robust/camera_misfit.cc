@@ -112,6 +112,29 @@ void sum_equations(const PoseRefiner& f, int count, const Pose& pose, const Robu
   sums->psi_sq *= loss.scale_px * loss.scale_px;
 }
 
+// What the loss's weights make a step of the linear equations too short by.
+double stretch_of(const Sums& sums) {
+  return sums.weight < kMostStretch * sums.slope ? sums.weight / sums.slope : kMostStretch;
+}
+
+// The pose's step that goes with the step `asked` of the cameras' parameters.
+void step_of_pose(const double G[kPose][kCamera], const double* asked, int num, double stretch,
+                  double step[kPose]) {
+  for (int r = 0; r < kPose; ++r) {
+    step[r] = 0;
+    for (int q = 0; q < num; ++q) step[r] += stretch * (G[r][q] * asked[q]);
+  }
+}
+
+// The pose's block of the sums, inverted. False: it is singular.
+bool invert_pose(const Sums& sums, double inverse[kPose * kPose]) {
+  double of_pose[kPose * (kPose + 1) / 2];
+  for (int r = 0, slot = 0; r < kPose; ++r) {
+    for (int c = r; c < kPose; ++c) of_pose[slot++] = sums.upper[r][c];
+  }
+  return invert_symmetric(kPose, of_pose, inverse);
+}
+
 }  // namespace
 
 void add_camera_misfit(const PoseRefiner& f, int count, const Pose& pose, const RobustLoss& loss,
@@ -126,11 +149,8 @@ void add_camera_misfit(const PoseRefiner& f, int count, const Pose& pose, const 
   const int num = has_centre ? kCamera : kTurns;
   Sums sums;
   sum_equations(f, count, pose, loss, &sums);
-  double of_pose[kPose * (kPose + 1) / 2], inverse[kPose * kPose];
-  for (int r = 0, slot = 0; r < kPose; ++r) {
-    for (int c = r; c < kPose; ++c) of_pose[slot++] = sums.upper[r][c];
-  }
-  if (!invert_symmetric(kPose, of_pose, inverse)) return;
+  double inverse[kPose * kPose];
+  if (!invert_pose(sums, inverse)) return;
   // The pose's slopes G by the cameras' parameters, and what it leaves of information and gradient.
   double G[kPose][kCamera], gradient[kCamera], packed[kCamera * (kCamera + 1) / 2];
   const double least = kLeastNoise * f.threshold_px;
@@ -153,8 +173,7 @@ void add_camera_misfit(const PoseRefiner& f, int count, const Pose& pose, const 
   }
   double left_open[kCamera * kCamera];
   if (!invert_symmetric(num, packed, left_open)) return;
-  const double stretch =
-      sums.weight < kMostStretch * sums.slope ? sums.weight / sums.slope : kMostStretch;
+  const double stretch = stretch_of(sums);
   double asked[kCamera], evidence = 0;
   for (int q = 0; q < num; ++q) {
     asked[q] = 0;
@@ -164,10 +183,7 @@ void add_camera_misfit(const PoseRefiner& f, int count, const Pose& pose, const 
   misfit->chi2 = evidence * stretch / variance;
   if (!(misfit->chi2 > (has_centre ? kCameraEvidence : kTurnsEvidence))) return;
   double step[kPose], of_step[25], grown[25];
-  for (int r = 0; r < kPose; ++r) {
-    step[r] = 0;
-    for (int q = 0; q < num; ++q) step[r] += stretch * (G[r][q] * asked[q]);
-  }
+  step_of_pose(G, asked, num, stretch, step);
   for (int r = 0; r < kPose; ++r) {
     for (int c = 0; c < kPose; ++c) {
       of_step[kPose * r + c] = step[r] * step[c];

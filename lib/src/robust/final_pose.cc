@@ -182,6 +182,20 @@ RobustLoss plane_loss(const PoseRefiner& f, const Mat3& H, int count) {
 // gravity is larger contradicts gravity.
 constexpr double kGravityExcludes = 13.816;
 
+// If gravity contradicts one of two motions and not the other, only the other is left. Returns how
+// many are.
+int exclude_by_gravity(const double from_gravity[2], PlaneFit* fit) {
+  for (int k = 0; k < 2; ++k) {
+    if (from_gravity[k] > kGravityExcludes && from_gravity[1 - k] < kGravityExcludes) {
+      fit->pose[0] = fit->pose[1 - k];
+      fit->certain[0] = fit->certain[1 - k];
+      fit->uncertainty[0] = fit->uncertainty[1 - k];
+      return 1;
+    }
+  }
+  return 2;
+}
+
 }  // namespace
 
 double median_noise_px(const PoseRefiner& f, const Mat3& M, int count) {
@@ -402,16 +416,7 @@ int refine_on_plane(const PoseRefiner& f, const Mat3& H, const Vec3& mean_ray0, 
     std::copy(all, all + 25, noise);
     fit->certain[k] = all_finite(noise, 25);
   }
-  // If gravity contradicts one of the two motions and not the other, only the other is returned.
-  for (int k = 0; k < num && num == 2; ++k) {
-    if (from_gravity[k] > kGravityExcludes && from_gravity[1 - k] < kGravityExcludes) {
-      fit->pose[0] = fit->pose[1 - k];
-      fit->certain[0] = fit->certain[1 - k];
-      fit->uncertainty[0] = fit->uncertainty[1 - k];
-      return 1;
-    }
-  }
-  return num;
+  return num == 2 ? exclude_by_gravity(from_gravity, fit) : num;
 }
 
 }  // namespace tv

@@ -54,6 +54,43 @@ void refine_epipolar(Fit& f) {
   collect_support(f);
 }
 
+// The pose, homography, inliers and covariance that a pair of this kind has.
+void take_kind(Fit& f, tv_kind kind, const Rivals& rivals) {
+  TwoViewOutcome& out = *f.out;
+  switch (kind) {
+    case TV_KIND_PLANAR:
+      choose_planar_pose(f, rivals);
+      out.essential_inliers = f.num_support;
+      out.has_R = out.has_t = true;
+      break;
+    case TV_KIND_CALIBRATED: {
+      PoseUncertainty uncertainty;
+      if (uncertainty_of(f.refiner, out.epipolar.pose, &uncertainty)) {
+        store_uncertainty(uncertainty, &out);
+      }
+      out.has_R = out.has_t = true;
+      break;
+    }
+    case TV_KIND_PANORAMIC:
+      out.epipolar.pose.R = out.H = rivals.R;
+      out.has_R = true;
+      inliers_of_transfer(f, out.H);
+      break;
+    case TV_KIND_NO_MOTION:
+      if (f.problem.calibrated) {
+        out.epipolar.pose.R = out.H = Mat3::Identity();
+        out.has_R = true;
+      }
+      inliers_of_transfer(f, out.H);
+      break;
+    case TV_KIND_PLANAR_OR_PANORAMIC: inliers_of_transfer(f, out.H); break;
+    case TV_KIND_DEGENERATE:
+      std::fill(out.inlier, out.inlier + f.matches.num_all, uint8_t{0});
+      break;
+    case TV_KIND_UNCALIBRATED: break;
+  }
+}
+
 }  // namespace
 
 void finish_two_view(TwoViewProblem& problem, const TwoViewModel& model, Arena& arena,
@@ -98,38 +135,7 @@ void finish_two_view(TwoViewProblem& problem, const TwoViewModel& model, Arena& 
   out.evidence->kind = kind;
   out.H = rivals.H;
   out.has_H = kind == TV_KIND_PLANAR || kind == TV_KIND_PLANAR_OR_PANORAMIC;
-  switch (kind) {
-    case TV_KIND_PLANAR:
-      choose_planar_pose(f, rivals);
-      out.essential_inliers = f.num_support;
-      out.has_R = out.has_t = true;
-      break;
-    case TV_KIND_CALIBRATED: {
-      PoseUncertainty uncertainty;
-      if (uncertainty_of(f.refiner, out.epipolar.pose, &uncertainty)) {
-        store_uncertainty(uncertainty, &out);
-      }
-      out.has_R = out.has_t = true;
-      break;
-    }
-    case TV_KIND_PANORAMIC:
-      out.epipolar.pose.R = out.H = rivals.R;
-      out.has_R = true;
-      inliers_of_transfer(f, out.H);
-      break;
-    case TV_KIND_NO_MOTION:
-      if (problem.calibrated) {
-        out.epipolar.pose.R = out.H = Mat3::Identity();
-        out.has_R = true;
-      }
-      inliers_of_transfer(f, out.H);
-      break;
-    case TV_KIND_PLANAR_OR_PANORAMIC: inliers_of_transfer(f, out.H); break;
-    case TV_KIND_DEGENERATE:
-      for (size_t i = 0; i < n; ++i) out.inlier[i] = 0;
-      break;
-    case TV_KIND_UNCALIBRATED: break;
-  }
+  take_kind(f, kind, rivals);
   measure_evidence(f, arena);
   const double growth =
       growth_by_disagreement(out.evidence->num_different_inliers, out.evidence->num_different);

@@ -3,6 +3,26 @@
 #include "base/math.h"
 
 namespace tv {
+namespace {
+
+// Columns of the answer: the derivatives of (direction step, inverse distance) by the noise of the
+// four pixel coordinates, then by the pose's five parameters. The errors of the match are scratch.
+void answer_to_errors(const BundleFrame& frame, const Elimination& e, BundleMatch* match,
+                      double answer[3][9]) {
+  for (int c = 0; c < 9; ++c) {
+    double noise[4] = {}, parameter[5] = {};
+    (c < 4 ? noise[c] : parameter[c - 4]) = 1.0;
+    double move[3];
+    match->error[0][0] = -noise[0];
+    match->error[0][1] = -noise[1];
+    match->error[1][0] = -noise[2];
+    match->error[1][1] = -noise[3];
+    linear_step(frame, *match, e, parameter, move);
+    for (int r = 0; r < 3; ++r) answer[r][c] = move[r];
+  }
+}
+
+}  // namespace
 
 bool point_covariance(const Camera cameras[2], const BundleFrame& frame, double baseline,
                       const double* pose_covariance, double noise_px, const tv_point& point,
@@ -16,20 +36,8 @@ bool point_covariance(const Camera cameras[2], const BundleFrame& frame, double 
   }
   const Elimination e = eliminate(frame, match);
   if (!(e.length > 0.0)) return false;
-  // Columns: the derivatives of (direction step, inverse distance) by the noise of the four pixel
-  // coordinates, then by the pose's five parameters.
   double answer[3][9];
-  for (int c = 0; c < 9; ++c) {
-    double noise[4] = {}, parameter[5] = {};
-    (c < 4 ? noise[c] : parameter[c - 4]) = 1.0;
-    double move[3];
-    match.error[0][0] = -noise[0];
-    match.error[0][1] = -noise[1];
-    match.error[1][0] = -noise[2];
-    match.error[1][1] = -noise[3];
-    linear_step(frame, match, e, parameter, move);
-    for (int r = 0; r < 3; ++r) answer[r][c] = move[r];
-  }
+  answer_to_errors(frame, e, &match, answer);
   double parameters[3][3];
   for (int i = 0; i < 3; ++i) {
     for (int j = i; j < 3; ++j) {
