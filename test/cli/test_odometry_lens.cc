@@ -196,6 +196,63 @@ void test_a_camera_that_goes_straight_does_not_show_it(void) {
   TEST_ASSERT_TRUE(std::sqrt(found.focal_variance) > kMostFocalSigma);
 }
 
+CameraEvidence evidence(Scene scene, const tv_camera& camera) {
+  for (size_t k = 0; k < scene.keyframes.size(); ++k) scene.moving[k].key = &scene.keyframes[k];
+  scene.moving.resize(scene.keyframes.size());
+  return evidence_on_camera(scene.moving, scene.points, camera);
+}
+
+tv_camera camera_with(const SimpleLens& lens) { return camera_of_lens(lens, kWidth, kHeight); }
+
+void test_the_right_camera_is_not_contradicted(void) {
+  for (const SimpleLens& lens : {SimpleLens{kFocal}, SimpleLens{kFocal, -0.25, 0.05},
+                                 SimpleLens{kFocal, 0.1, 0, 0, 9, -7}}) {
+    const CameraEvidence found = evidence(fly({0.9, lens, 0.2}), camera_with(lens));
+    TEST_ASSERT_TRUE(found.is_known);
+    TEST_ASSERT_FALSE(found.contradicts());
+    TEST_ASSERT_DOUBLE_WITHIN(3 * std::hypot(found.focal_sigma, 0.003), 0, found.focal_change);
+    TEST_ASSERT_DOUBLE_WITHIN(3 * std::hypot(found.edge_sigma, 0.003), 0, found.edge_change);
+  }
+}
+
+void test_a_wrong_focal_length_is_contradicted(void) {
+  constexpr double kFactor = 0.85;
+  const SimpleLens lens{kFocal, -0.2, 0.05}, wrong{kFactor * kFocal, -0.2, 0.05};
+  const CameraEvidence found = evidence(fly({0.9, lens}), camera_with(wrong));
+  TEST_ASSERT_TRUE(found.contradicts_focal());
+  TEST_ASSERT_DOUBLE_WITHIN(3 * found.focal_sigma, 1 / kFactor - 1, found.focal_change);
+}
+
+void test_a_lens_that_was_left_out_is_contradicted(void) {
+  const SimpleLens lens{kFocal, -0.3, 0.05};
+  const CameraEvidence found = evidence(fly({0.9, lens}), camera_with({kFocal}));
+  TEST_ASSERT_TRUE(found.contradicts_lens());
+  TEST_ASSERT_FALSE(found.contradicts_focal());
+  // Four fifths of the way to a corner.
+  const double d = 0.8 * std::hypot(kWidth, kHeight) / 2 / kFocal;
+  TEST_ASSERT_DOUBLE_WITHIN(0.02, -0.3 * d * d + 0.05 * d * d * d * d, found.edge_change);
+}
+
+void test_pixels_that_are_not_square_are_the_cameras(void) {
+  constexpr double kStretch = 1.15;
+  Scene scene = fly({0.9});
+  for (FlightKeyframe& key : scene.keyframes)
+    for (tv_map_observation& seen : key.observations)
+      seen.y = static_cast<float>((kHeight - 1) / 2.0 +
+                                  kStretch * (static_cast<double>(seen.y) - (kHeight - 1) / 2.0));
+  tv_camera camera = camera_with({kFocal});
+  camera.fy *= kStretch;
+  const CameraEvidence found = evidence(scene, camera);
+  TEST_ASSERT_TRUE(found.is_known);
+  TEST_ASSERT_FALSE(found.contradicts());
+}
+
+void test_a_camera_that_goes_straight_contradicts_no_focal_length(void) {
+  const CameraEvidence found = evidence(fly({0}), camera_with({kFocal * kWrong}));
+  TEST_ASSERT_TRUE(found.is_known);
+  TEST_ASSERT_FALSE(found.contradicts());
+}
+
 void test_few_keyframes_tell_nothing(void) {
   Scene scene = fly({0.9});
   scene.keyframes.resize(7);
@@ -203,6 +260,7 @@ void test_few_keyframes_tell_nothing(void) {
   TEST_ASSERT_FALSE(found.is_known);
   TEST_ASSERT_EQUAL_DOUBLE(kFocal * kWrong, found.lens.focal_px);
   TEST_ASSERT_EQUAL_DOUBLE(kPriorLogFocal, std::sqrt(found.focal_variance));
+  TEST_ASSERT_FALSE(evidence(scene, camera_with({kFocal * kWrong})).is_known);
 }
 
 void test_the_librarys_camera_has_the_lens_of_the_estimate(void) {
@@ -231,6 +289,11 @@ int main(void) {
   RUN_TEST(test_a_lens_that_is_not_centred_is_found);
   RUN_TEST(test_a_rolling_shutter_does_not_change_the_focal_length);
   RUN_TEST(test_a_camera_that_goes_straight_does_not_show_it);
+  RUN_TEST(test_the_right_camera_is_not_contradicted);
+  RUN_TEST(test_a_wrong_focal_length_is_contradicted);
+  RUN_TEST(test_a_lens_that_was_left_out_is_contradicted);
+  RUN_TEST(test_pixels_that_are_not_square_are_the_cameras);
+  RUN_TEST(test_a_camera_that_goes_straight_contradicts_no_focal_length);
   RUN_TEST(test_few_keyframes_tell_nothing);
   RUN_TEST(test_the_librarys_camera_has_the_lens_of_the_estimate);
   return UNITY_END();

@@ -4,7 +4,9 @@ import contextlib
 import io
 import json
 import os
+import re
 import stat
+import subprocess
 import sys
 import tempfile
 import unittest
@@ -130,10 +132,43 @@ class Flights(unittest.TestCase):
         self.assertLess(2 * right, carried(np.eye(3), 0 * t))
         self.assertLess(1.1 * right, carried(R1.T @ R0, -t))
 
+    def turning(self):
+        """A flight's folder, rendered once."""
+        return flights.render(2, os.path.join(self.scratch.name, "turning"),
+                              ["--first-frame", "60", "--max-frames", "110",
+                               "--depth-every", "0"])
+
+    def test_the_program_contradicts_a_camera_of_another_focal_length(self):
+        folder = self.turning()
+        with open(folder + "/cameras.yaml", encoding="utf-8") as file:
+            camera = file.read()
+        for factor, is_wrong in ((1, False), (0.88, True)):
+            with self.subTest(factor=factor):
+                out = os.path.join(self.scratch.name, f"camera_{factor}")
+                os.makedirs(out)
+                given = os.path.join(self.scratch.name, "given.yaml")
+                with open(given, "w", encoding="utf-8") as file:
+                    file.write(re.sub(r"(f[xy]: *)([0-9.]+)",
+                                      lambda m: m[1] + str(factor * float(m[2])), camera))
+                done = subprocess.run([runs.program_path(None), "odometry", folder, "-o", out,
+                                       "--camera", given, "--no-pictures"], check=True,
+                                      capture_output=True, text=True)
+                with open(out + "/result.json", encoding="utf-8") as file:
+                    check = json.load(file)["camera_check"]
+                with open(out + "/report.html", encoding="utf-8") as file:
+                    report = file.read()
+                self.assertEqual(list(check),
+                                 ["contradicted", "focal_change_percent", "focal_sigma_percent",
+                                  "edge_change_percent", "edge_sigma_percent"])
+                self.assertEqual(check["contradicted"], is_wrong)
+                self.assertLess(abs(check["focal_change_percent"] - 100 * (1 / factor - 1)),
+                                3 * np.hypot(check["focal_sigma_percent"], 1))
+                words = "contradict the camera"
+                self.assertEqual("doubtful     the pictures " + words in done.stdout, is_wrong)
+                self.assertEqual("The pictures " + words in report, is_wrong)
+
     def test_the_program_finds_the_focal_length_of_a_flight_that_turns(self):
-        folder = flights.render(2, os.path.join(self.scratch.name, "turning"),
-                                ["--first-frame", "60", "--max-frames", "110",
-                                 "--depth-every", "0"])
+        folder = self.turning()
         camera = next(iter(formats.read_camera_set(folder + "/cameras.yaml").values()))
         out = os.path.join(self.scratch.name, "without_camera")
         runs.run_odometry(runs.program_path(None), folder, out, ["--focal-35mm", "auto"])

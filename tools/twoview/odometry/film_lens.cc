@@ -175,35 +175,6 @@ class FilmPairs {
   std::vector<Pair> pairs_;
 };
 
-// The keyframes with how they moved from the frame before them to the frame after, as both were
-// tracked: what a rolling shutter makes of it is a part of the adjustment.
-std::vector<LensKeyframe> in_motion(const std::vector<FlightKeyframe>& keyframes,
-                                    const Flight& flight) {
-  std::vector<LensKeyframe> moving;
-  const std::vector<FlightFrame>& frames = flight.frames();
-  for (const FlightKeyframe& key : keyframes) {
-    moving.push_back({&key, {}, {}});
-    const size_t at = flight.index_given(key.keyframe.frame);
-    const int32_t segment = frames[at].live_segment;
-    const auto follows = [&](size_t n) {
-      return n < frames.size() && segment >= 0 && frames[n].live_segment == segment;
-    };
-    const size_t first = at > 0 && follows(at - 1) ? at - 1 : at;
-    const size_t last = follows(at + 1) ? at + 1 : at;
-    if (first == last) continue;
-    const double share = 1.0 / static_cast<double>(last - first);
-    const Pose last_from_first = composed(inverse(frames[last].live), frames[first].live);
-    const std::array<double, 4> q = quaternion_of(last_from_first.R);
-    const double sine = std::hypot(std::hypot(q[0], q[1]), q[2]);
-    const double angle_over_sine = sine > 1e-12 ? 2 * std::atan2(sine, q[3]) / sine : 2;
-    for (size_t k = 0; k < 3; ++k) {
-      moving.back().turn[k] = share * angle_over_sine * q[k];
-      moving.back().move[k] = share * last_from_first.t[k];
-    }
-  }
-  return moving;
-}
-
 }  // namespace
 
 nlohmann::ordered_json FilmLens::json() const {

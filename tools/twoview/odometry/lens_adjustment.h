@@ -23,10 +23,35 @@ struct LensKeyframe {
   std::array<double, 3> turn{}, move{};
 };
 
+// The keyframes with how they moved from the frame before them to the frame after, as both were
+// tracked: what a rolling shutter makes of it is a part of the adjustment.
+std::vector<LensKeyframe> in_motion(const std::vector<FlightKeyframe>& keyframes,
+                                    const Flight& flight);
+
 // Adjusts the lens in windows of successive keyframes of a segment, each with poses and points of
 // its own. The keyframes are of pictures of this size, and were tracked with the lens `start`.
 LensEstimate adjust_lens(const std::vector<LensKeyframe>& keyframes,
                          const std::vector<tv_map_point>& points, int width, int height,
                          const SimpleLens& start);
+
+// What a map says of the camera that it was made with: of its focal length, and of how its lens
+// bends the picture four fifths of the way from the middle to a corner.
+struct CameraEvidence {
+  bool is_known = false;    // false: the keyframes are too few
+  double focal_change = 0;  // that of the camera that fits the map, over the given one, less 1
+  double focal_sigma = 0;   // its standard deviation
+  // By how much farther from the middle than by the given camera a ray meets the picture, over the
+  // distance, and its standard deviation.
+  double edge_change = 0, edge_sigma = 0;
+
+  bool contradicts_focal() const;
+  bool contradicts_lens() const;
+  bool contradicts() const { return contradicts_focal() || contradicts_lens(); }
+};
+
+// Adjusts the camera, of any model, as adjust_lens does: in six windows and with few points of
+// each, and with all where these are evidence against the camera.
+CameraEvidence evidence_on_camera(const std::vector<LensKeyframe>& keyframes,
+                                  const std::vector<tv_map_point>& points, const tv_camera& camera);
 
 }  // namespace cli

@@ -14,6 +14,7 @@
 #include "files/camera_file.h"
 #include "files/camera_formats.h"
 #include "files/image_file.h"
+#include "odometry/camera_check.h"
 #include "odometry/colmap_folder.h"
 #include "odometry/film_lens.h"
 #include "odometry/flight.h"
@@ -376,8 +377,9 @@ std::string still_note(const FlightResult& result) {
 }
 
 std::string summary(const FlightResult& result, const std::optional<FilmLens>& lens,
-                    const FrameSource& source, const OutputSet& files, const std::string& colmap,
-                    const std::string& notes, const std::string& room) {
+                    const CameraEvidence& on_camera, const FrameSource& source,
+                    const OutputSet& files, const std::string& colmap, const std::string& notes,
+                    const std::string& room) {
   const nlohmann::ordered_json& j = result.json;
   std::string text =
       summary_line("source", "%s, %d frames", source.kind().c_str(), j["num_frames"].get<int>());
@@ -389,6 +391,11 @@ std::string summary(const FlightResult& result, const std::optional<FilmLens>& l
           summary_line("doubtful", "%s", "the focal length is doubtful: do not fly by this path");
       text += summary_line("advice", "%s", kDoubtfulFocalAdvice);
     }
+  }
+  if (on_camera.contradicts()) {
+    text += summary_line("doubtful", "%s: do not fly by this path",
+                         contradiction_words(on_camera).c_str());
+    text += summary_line("advice", "%s", kContradictedCameraAdvice);
   }
   std::string counts;
   for (const auto& [name, count] : j["status_counts"].items())
@@ -569,6 +576,11 @@ int odometry(Arguments& a) {
     const Stopwatch watch(!common.quiet, "looking in the finished map for frames without a pose");
     flight.finish(stop);
   }
+  CameraEvidence on_camera;
+  if (!lens && !stop) {
+    const Stopwatch watch(!common.quiet, "comparing the map with the camera");
+    on_camera = check_camera(flight);
+  }
   for (const std::string& note : flight.notes()) common.note(note);
   for (const std::string& mask : flight.mask_files()) files.keep(mask);
   for (const std::string& note : source->notes()) common.note(note);
@@ -600,6 +612,7 @@ int odometry(Arguments& a) {
   }
   result.json["colmap_pictures"] = colmap.pictures_json();
   result.json["focal_length"] = lens ? lens->json() : nlohmann::ordered_json(nullptr);
+  result.json["camera_check"] = camera_check_json(on_camera);
   result.json["film"] = film_json(film);
   result.json["notes"] = common.notes;
   result.json["interrupted"] = was_stopped || stop;
@@ -613,8 +626,8 @@ int odometry(Arguments& a) {
   if (common.json) print(json_text(result.json));
   const std::string notes = common.note_lines();
   if (common.speaks())
-    print(summary(result, lens, *source, files, has_map ? colmap_words(colmap) : "", notes,
-                  room.summary));
+    print(summary(result, lens, on_camera, *source, files, has_map ? colmap_words(colmap) : "",
+                  notes, room.summary));
   files.commit();
   files.remove_others(own_files());
 #ifdef TWOVIEW_HAS_ROOM

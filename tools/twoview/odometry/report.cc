@@ -5,6 +5,7 @@
 #include <map>
 
 #include "odometry/assets.h"
+#include "odometry/camera_check.h"
 #include "odometry/film_lens.h"
 #include "odometry/view.h"
 #include "pair/result.h"
@@ -308,6 +309,12 @@ Headline headline(const FlightResult& result) {
     return {"poor", "doubtful",
             std::string("The focal length is doubtful, and so is the shape of the path: ") +
                 kDoubtfulFocalAdvice + ". " + share + "."};
+  if (const Json& check = j["camera_check"]; check.is_object() && check["contradicted"].get<bool>())
+    return {
+        "poor", "doubtful",
+        std::string("The pictures contradict the camera, and the shape of the path is wrong with "
+                    "it: ") +
+            kContradictedCameraAdvice + ". " + share + "."};
   if (segments > 1)
     return {"fair", "in pieces", share + ", in " + std::to_string(segments) + " segments."};
   if (lost > 0)
