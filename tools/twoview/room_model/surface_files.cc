@@ -16,12 +16,12 @@ void append_bits(std::string& bytes, uint32_t value, int num_bytes) {
   for (int k = 0; k < num_bytes; ++k) bytes += static_cast<char>(value >> 8 * k & 255);
 }
 
-// A byte of sRGB as linear light, 16 bits, which is what glTF's COLOR_0 holds: 8 bits would lose
-// the dark tones.
-uint32_t linear_16(uint8_t srgb) {
+// A byte of sRGB as linear light, which is what glTF's COLOR_0 holds. A float: 8 bits would lose
+// the dark tones, and MeshLab (2025.7) reads 16 bits as if they were 8.
+float linear_light(uint8_t srgb) {
   const double v = srgb / 255.0;
   const double linear = v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
-  return static_cast<uint32_t>(std::lround(65535 * linear));
+  return static_cast<float>(linear);
 }
 
 // The chunk with its length and kind, filled up to a multiple of four bytes.
@@ -34,7 +34,7 @@ std::string chunk(uint32_t kind, std::string bytes, char filler) {
 }
 
 // glTF's numbers for types of components, targets and primitives.
-enum { kUnsignedShort = 5123, kUnsignedInt = 5125, kFloat = 5126 };
+enum { kUnsignedInt = 5125, kFloat = 5126 };
 enum { kArrayBuffer = 34962, kElementArrayBuffer = 34963, kTriangles = 4 };
 constexpr uint32_t kJsonChunk = 0x4E4F534A, kBinChunk = 0x004E4942, kMagic = 0x46546C67;
 
@@ -110,8 +110,8 @@ std::string room_glb(const RoomModel& model) {
       append_float(positions, value);
       append_float(normals, static_cast<float>(normal[k]));
     }
-    for (const uint8_t value : v.rgb) append_bits(colours, linear_16(value), 2);
-    append_bits(colours, 65535, 2);  // alpha: assimp-py 1.2.0 (2026) takes 0 without it
+    for (const uint8_t value : v.rgb) append_float(colours, linear_light(value));
+    append_float(colours, 1);  // alpha: assimp-py 1.2.0 (2026) takes 0 without it
     append_float(sigmas, v.sigma);
   }
   for (const tv_room_triangle& t : model.triangles)
@@ -122,8 +122,7 @@ std::string room_glb(const RoomModel& model) {
   buffer.accessor(position)["min"] = {low[0], low[1], low[2]};
   buffer.accessor(position)["max"] = {high[0], high[1], high[2]};
   const int normal = buffer.add(normals, kFloat, "VEC3", count, kArrayBuffer);
-  const int colour = buffer.add(colours, kUnsignedShort, "VEC4", count, kArrayBuffer);
-  buffer.accessor(colour)["normalized"] = true;
+  const int colour = buffer.add(colours, kFloat, "VEC4", count, kArrayBuffer);
   const int sigma = buffer.add(sigmas, kFloat, "SCALAR", count, kArrayBuffer);
   const int index =
       buffer.add(indices, kUnsignedInt, "SCALAR", 3 * model.triangles.size(), kElementArrayBuffer);
