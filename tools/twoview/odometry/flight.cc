@@ -341,6 +341,7 @@ void Flight::finish(const std::atomic<bool>& stop) {
   int last = missing.empty() ? -1 : missing.rbegin()->first;
   if (!without_picture.empty()) last = std::max(last, without_picture.rbegin()->first);
   if (last < 0) return;
+  const Reach reach(frames_);
   const auto wanted = [&](int index) {
     return missing.count(index) != 0 || without_picture.count(index) != 0;
   };
@@ -355,14 +356,14 @@ void Flight::finish(const std::atomic<bool>& stop) {
                                               return std::abs(a.keyframe.time_s - frame.time_s) <
                                                      std::abs(b.keyframe.time_s - frame.time_s);
                                             });
-      locate(frame, *found->second, nearest->keyframe.id);
+      locate(frame, *found->second, nearest->keyframe.id, reach);
     }
     return frame.index < last;
   };
   source_.run(wanted, consume, stop);
 }
 
-void Flight::locate(SourceFrame frame, FlightFrame& record, int32_t near_id) {
+void Flight::locate(SourceFrame frame, FlightFrame& record, int32_t near_id, const Reach& reach) {
   try {
     prepare(frame);
   } catch (const BadInput&) {
@@ -375,9 +376,12 @@ void Flight::locate(SourceFrame frame, FlightFrame& record, int32_t near_id) {
   // A weak pose that nothing before or after confirms is not written as known.
   if (state.status != TV_ODOMETRY_TRACKING || !state.has_pose) return;
   if (record.origin != PoseOrigin::kNone && state.segment != record.segment) return;
+  const Pose pose = pose_of(state.world_from_cam_R, state.world_from_cam_t);
+  const auto index = static_cast<size_t>(&record - frames_.data());
+  if (!reach.contains(index, state.segment, pose.t)) return;
   record.origin = PoseOrigin::kLocated;
   record.segment = state.segment;
-  record.pose = pose_of(state.world_from_cam_R, state.world_from_cam_t);
+  record.pose = pose;
 }
 
 const Thumbnail* Flight::thumbnail(int number) const {
