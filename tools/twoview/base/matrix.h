@@ -13,6 +13,9 @@ Matrix3 product(const Matrix3& a, const Matrix3& b);
 Matrix3 transposed(const Matrix3& a);
 Vector3 applied(const Matrix3& a, const Vector3& v);  // the product a v
 Vector3 cross(const Vector3& a, const Vector3& b);
+inline Vector3 minus(const Vector3& a, const Vector3& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
 double dot(const Vector3& a, const Vector3& b);
 double norm(const Vector3& v);
 double determinant(const Matrix3& a);

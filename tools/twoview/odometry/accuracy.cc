@@ -9,10 +9,6 @@ namespace {
 
 constexpr double kDegrees = 57.29577951308232;
 
-Vector3 minus(const Vector3& a, const Vector3& b) {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
-
 Vector3 moved(const Similarity& s, const Vector3& x) {
   Vector3 y = applied(s.R, x);
   for (size_t k = 0; k < 3; ++k) y[k] = s.scale * y[k] + s.t[k];

@@ -11,10 +11,6 @@ bool is_tracked(const FlightFrame& frame) {
   return frame.origin == PoseOrigin::kTracked && frame.status != TV_ODOMETRY_ROTATION;
 }
 
-double distance(const Vector3& a, const Vector3& b) {
-  return norm({a[0] - b[0], a[1] - b[1], a[2] - b[2]});
-}
-
 }  // namespace
 
 Reach::Reach(const std::vector<FlightFrame>& frames) : frames_(frames) {
@@ -24,7 +20,7 @@ Reach::Reach(const std::vector<FlightFrame>& frames) : frames_(frames) {
     const double seconds = std::fabs(after.time_s - before.time_s);
     if (!(seconds > 0)) continue;
     double& speed = speed_[after.segment];
-    speed = std::max(speed, distance(before.pose.t, after.pose.t) / seconds);
+    speed = std::max(speed, norm(minus(before.pose.t, after.pose.t)) / seconds);
   }
 }
 
@@ -34,7 +30,7 @@ bool Reach::contains(size_t index, int32_t segment, const Vector3& place) const 
   if (speed == speed_.end()) return true;
   const auto is_near = [&](const FlightFrame& other) {
     const double seconds = std::fabs(frames_[index].time_s - other.time_s);
-    return distance(other.pose.t, place) <= kMargin * speed->second * seconds;
+    return norm(minus(other.pose.t, place)) <= kMargin * speed->second * seconds;
   };
   const auto is_of_it = [&](size_t n) {
     return is_tracked(frames_[n]) && frames_[n].segment == segment;

@@ -22,9 +22,6 @@ constexpr double kWorstShare = 0.25;
 constexpr double kContradicted = 10.83;
 
 Vector3 plus(const Vector3& a, const Vector3& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
-Vector3 minus(const Vector3& a, const Vector3& b) {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
 Vector3 times(double s, const Vector3& a) { return {s * a[0], s * a[1], s * a[2]}; }
 
 // The quaternion w x y z of a rotation matrix.

@@ -8,10 +8,6 @@ namespace {
 
 constexpr uint32_t kMostInLeaf = 4;
 
-Vector3 minus(const Vector3& a, const Vector3& b) {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
-
 // a + s u + t v
 Vector3 along(const Vector3& a, double s, const Vector3& u, double t, const Vector3& v) {
   return {a[0] + s * u[0] + t * v[0], a[1] + s * u[1] + t * v[1], a[2] + s * u[2] + t * v[2]};

@@ -23,10 +23,6 @@ Vector3 sum_of(const Vector3& a, const Vector3& b) {
   return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
 }
 
-Vector3 difference(const Vector3& a, const Vector3& b) {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
-
 std::optional<double> median_of(std::vector<double> values) {
   if (values.empty()) return {};
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -44,7 +40,7 @@ void for_shown(const tv_camera& camera, const Matrix3& R, const Vector3& t,
   std::vector<double> points, pixels(2 * todo.size());
   std::vector<uint8_t> inside(todo.size());
   for (const size_t i : todo) {
-    const Vector3 in_camera = applied(inverse, difference(places[i], t));
+    const Vector3 in_camera = applied(inverse, minus(places[i], t));
     points.insert(points.end(), in_camera.begin(), in_camera.end());
   }
   check(tv_camera_project_points(&camera, points.data(), static_cast<int32_t>(todo.size()),
@@ -181,14 +177,14 @@ Placement registered(const std::vector<JudgedPoint>& points, const TriangleMesh&
       if (!(near.distance < reach)) continue;
       const auto& corners = mesh.triangles[near.triangle];
       const auto corner = [&](size_t k) { return mesh.places[static_cast<size_t>(corners[k])]; };
-      Vector3 n = cross(difference(corner(1), corner(0)), difference(corner(2), corner(0)));
+      Vector3 n = cross(minus(corner(1), corner(0)), minus(corner(2), corner(0)));
       const double length = norm(n);
       if (!(length > 0)) continue;
       for (double& value : n) value /= length;
-      const Vector3 arm = difference(p, centre), turn = cross(arm, n);
+      const Vector3 arm = minus(p, centre), turn = cross(arm, n);
       const cv::Matx<double, 7, 1> row(turn[0], turn[1], turn[2], n[0], n[1], n[2], dot(n, arm));
       normal += row * row.t();
-      right -= row * dot(n, difference(p, near.place));
+      right -= row * dot(n, minus(p, near.place));
     }
     for (int k = 0; k < 7; ++k) normal(k, k) += kRidge * (normal(k, k) + 1);
     cv::Matx<double, 7, 1> by;
