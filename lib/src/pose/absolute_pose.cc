@@ -5,11 +5,8 @@
 
 #include "base/math.h"
 #include "base/order.h"
-#include "base/random.h"
 #include "geometry/null_space.h"
-#include "pose/absolute_pose_3pt.h"
 #include "pose/reprojection.h"
-#include "robust/chance.h"
 #include "robust/gravity.h"
 #include "robust/ldlt.h"
 #include "robust/loop.h"
@@ -17,71 +14,6 @@
 
 namespace tv {
 namespace {
-
-// ---- search ----
-
-// Local optimisation takes matches within kNear thresholds, at most kMostLocal of them.
-constexpr double kNear = 3;
-constexpr int kMostLocal = 128, kLocalIterations = 5;
-constexpr double kLocalGain = 1e-3;
-
-// The least number of samples, and that number times the inliers where inliers are few.
-constexpr int kMinIterations = 20, kFewInliersIterations = 1000;
-
-int near_sightings(const Sightings& s, const Pose& pose, double limit_px, int32_t* indices) {
-  int near = 0;
-  for (int i = 0; i < s.num; ++i) {
-    if (reprojection_sq(s.all[i], pose) <= limit_px * limit_px) indices[near++] = i;
-  }
-  return near;
-}
-
-struct AbsoluteEstimator {
-  using Model = Pose;
-  static constexpr int kSampleSize = 3;
-  static constexpr int kMaxModels = kMaxAbsolutePose3pt;
-  static constexpr int kBatch = 1;
-  const Sightings& sightings;
-  double threshold_px;
-  int32_t* indices;  // scratch, one entry a match
-
-  int generate_models(const int32_t* sample, Pose* poses) const {
-    double rays[3][3], points[3][3];
-    for (int k = 0; k < 3; ++k) {
-      const Sighting& sighting = sightings.all[sample[k]];
-      unit_ray(sighting, rays[k]);
-      for (int d = 0; d < 3; ++d) points[k][d] = sighting.point[d];
-    }
-    return absolute_pose_3pt(rays, points, poses);
-  }
-  int64_t fast_cost(const Pose& pose, int64_t bound) const {
-    return reprojection_cost(sightings, pose, threshold_px, bound);
-  }
-  int64_t full_cost(const Pose& pose, int* num_inliers) const {
-    const double inverse_sq = 1 / (threshold_px * threshold_px);
-    int64_t cost = 0;
-    *num_inliers = 0;
-    for (int i = 0; i < sightings.num; ++i) {
-      const double q = reprojection_sq(sightings.all[i], pose) * inverse_sq;
-      *num_inliers += q <= 1;
-      cost += q < 1 ? static_cast<int64_t>(q * kSightingCost) : kSightingCost;
-    }
-    return cost;
-  }
-  void refine_model(Pose* pose) const {
-    int count = near_sightings(sightings, *pose, kNear * threshold_px, indices);
-    if (count > kMostLocal) {
-      for (int k = 0; k < kMostLocal; ++k) {
-        indices[k] = indices[static_cast<int64_t>(k) * count / kMostLocal];
-      }
-      count = kMostLocal;
-    }
-    const PoseProblem problem{nullptr, sightings, indices, count, threshold_px, {}, 0};
-    refine_absolute(problem, kLocalIterations, kLocalGain, pose, nullptr);
-  }
-};
-
-// ---- finish ----
 
 // A pose is refined at the one of these scales of the loss, in standard deviations of the noise, at
 // which Huber's estimate of the variance, sum psi^2 / (sum psi')^2, is least: with heavy tails that
@@ -306,34 +238,6 @@ double turn_sq(const Pose& a, const Pose& b) {
   return sum;
 }
 
-// The probability that a wrong match agrees with the pose: by pairings of points with the pixels of
-// other matches, and by the share of the image that the threshold's disc covers (robust/chance.h).
-double chance_of(const Finish& f, const Pose& pose, uint64_t seed) {
-  constexpr int kPairings = 512;
-  constexpr double kPriorWeight = 100;
-  const int n = f.s.num;
-  if (n < 2) return 1;
-  double sigmas_sq = 0;
-  for (int k = 0; k < n; ++k) {
-    const double sigma = f.input.sigma(f.s.order[k]);
-    sigmas_sq += sigma * sigma / n;
-  }
-  const tv_camera& camera = f.input.camera.model;
-  const double area = static_cast<double>(camera.width) * camera.height;
-  const double prior = std::min(1.0, kPi * f.threshold_px * f.threshold_px * sigmas_sq / area);
-  Random random = random_seeded(seed);
-  int agreeing = 0;
-  for (int k = 0; k < kPairings; ++k) {
-    const uint32_t i = random_below(random, static_cast<uint32_t>(n));
-    const uint32_t j = random_below(random, static_cast<uint32_t>(n - 1));
-    Sighting wrong = f.s.all[j + (j >= i)];
-    std::copy_n(f.s.all[i].point, 3, wrong.point);
-    agreeing += reprojection_sq(wrong, pose) <= f.threshold_px * f.threshold_px;
-  }
-  const double weight = std::min(0.5 * n * (n - 1.0), double(kPairings));
-  return (weight * agreeing / kPairings + kPriorWeight * prior) / (weight + kPriorWeight);
-}
-
 // The standard deviations of the rotation and, over the distance of the points, of the position.
 double largest_sigma(const Candidate& c, double distance) {
   double rotation = 0, position = 0;
@@ -454,11 +358,7 @@ void fit_absolute_pose(const SightingInput& input, const Sightings& s,
     f.gravity = {1 / (prior.sigma_rad * prior.sigma_rad), prior.down[0], prior.down[1]};
   const Candidate found = refined(f, search.found ? &search.pose : nullptr);
   int different = search.found ? count_inliers(f, found.pose, out, nullptr) : 0;
-  const double log_alarms = different > 3
-                                ? log_false_alarms(s.num, different, 3, kMaxAbsolutePose3pt,
-                                                   chance_of(f, found.pose, options.seed))
-                                : 0;
-  if (!found.determined || !(log_alarms < kLogMeaningful)) {
+  if (!found.determined || !is_meaningful(input, s, found.pose, different, options)) {
     // No pose: too few matches, points on a line, or no more inliers than chance explains.
     out->num_inliers = 0;
     out->coverage = out->rms_error_px = 0;
@@ -486,27 +386,6 @@ void fit_absolute_pose(const SightingInput& input, const Sightings& s,
 }
 
 }  // namespace
-
-void search_absolute_pose(const Sightings& sightings, const tv_absolute_pose_options& options,
-                          bool progressive, Arena& arena, AbsolutePoseSearch* search) {
-  if (sightings.num < AbsoluteEstimator::kSampleSize) return;
-  ArenaScope scope(arena);
-  int32_t* indices = arena_alloc<int32_t>(arena, static_cast<size_t>(sightings.num));
-  AbsoluteEstimator estimator{sightings, options.max_error_px, indices};
-  Sampler sampler =
-      make_sampler(options.seed, sightings.num, AbsoluteEstimator::kSampleSize, progressive);
-  // Few matches have few different samples; so many draws miss all those of four inliers once in 50
-  // times.
-  const double n = sightings.num, different = n * (n - 1) * (n - 2) / 6;
-  const int most =
-      different < options.max_iterations ? static_cast<int>(different) : options.max_iterations;
-  const LoopOptions loop{options.confidence, kMinIterations, most, options.fixed_iterations,
-                         kFewInliersIterations};
-  const LoopResult<Pose> result = robust_loop(estimator, sampler, loop);
-  search->found = result.found;
-  search->num_iterations = result.num_iterations;
-  if (result.found) search->pose = result.model;
-}
 
 void finish_absolute_pose(const SightingInput& input, const Sightings& s,
                           const tv_absolute_pose_options& options, const AbsolutePoseSearch& search,

@@ -1,29 +1,17 @@
-// The absolute pose behind the API boundary, in two halves: the search, by the robust loop with the
-// solver for three points, and the finish, with refinement, covariance and verdict.
-// docs/algorithms/absolute_pose.md. Tests: test/unit/test_absolute_pose.cc,
-// test/property/test_absolute_pose_statistics.cc.
+// The absolute pose behind the API boundary: after the search (pose/absolute_search.h) the finish,
+// with refinement, covariance and verdict. docs/algorithms/absolute_pose.md. Tests:
+// test/unit/test_absolute_pose.cc, test/property/test_absolute_pose_statistics.cc.
 #pragma once
 
-#include "pose/sightings.h"
-#include "twoview/absolute_pose.h"
+#include "pose/absolute_search.h"
 
 namespace tv {
-
-struct AbsolutePoseSearch {
-  bool found = false;
-  Pose pose;  // of the points as Sightings has them
-  int num_iterations = 0;
-};
 
 // How many bytes of arena one estimate takes.
 inline size_t absolute_pose_bytes(int max_matches) {
   const size_t n = static_cast<size_t>(max_matches);
   return sightings_bytes(n) + arena_bytes<int32_t>(n) + arena_bytes<double>(n);
 }
-
-// progressive: the matches are in the order of their ratios, and the first ones are sampled first.
-void search_absolute_pose(const Sightings& sightings, const tv_absolute_pose_options& options,
-                          bool progressive, Arena& arena, AbsolutePoseSearch* search);
 
 // Writes all of *result but struct_size, num_matches and seed, and to inlier_mask, unless it is
 // null, a byte for each match of the caller, which must be 0.

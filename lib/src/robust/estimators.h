@@ -5,18 +5,11 @@
 #include "geometry/relpose_5pt.h"
 #include "geometry/sampson.h"
 #include "geometry/transfer.h"
+#include "robust/loop.h"
 #include "robust/matches.h"
 #include "robust/models.h"
 
 namespace tv {
-
-// Local optimisation uses the matches within kNear thresholds, so that further matches can become
-// inliers. It takes at most kLocalIterations steps, until a step lowers the cost by less than
-// kLocalGain of it. For a pose it uses at most kMostLocal matches; the final refinement uses all.
-inline constexpr int kMostLocal = 128;
-inline constexpr double kNear = 3;
-inline constexpr int kLocalIterations = 5;
-inline constexpr double kLocalGain = 1e-3;
 
 // The samples that PoseEstimator solves at once, and their models: 7.7 KB, in the arena to save
 // stack.

@@ -25,6 +25,13 @@ namespace tv {
 // A window of local optimisation is kWindow samples and one more for every kWindowShare matches.
 inline constexpr int kWindow = 8, kWindowShare = 2;
 
+// Local optimisation uses the matches within kNear thresholds, so that further matches can become
+// inliers. It takes at most kLocalIterations steps, until a step lowers the cost by less than
+// kLocalGain of it. For a pose it uses at most kMostLocal matches; the final refinement uses all.
+inline constexpr double kNear = 3;
+inline constexpr int kMostLocal = 128, kLocalIterations = 5;
+inline constexpr double kLocalGain = 1e-3;
+
 // The most samples that few inliers alone can require (LoopOptions::few_inliers_iterations).
 inline constexpr int kMostForFewInliers = 1000;
 

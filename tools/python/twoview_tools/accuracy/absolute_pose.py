@@ -190,8 +190,9 @@ def real(num, step):
     """Yields (name of the sequence, [problem])."""
     for name in sorted(os.listdir(datasets.data_dir())):
         folder = os.path.join(datasets.data_dir(), name)
-        if not name.startswith("seq_") or not os.path.isfile(os.path.join(folder, "cameras.yaml")):
-            continue
+        needed = [os.path.join(folder, needed) for needed in ("cameras.yaml", "groundtruth.txt")]
+        if not name.startswith("seq_") or not all(map(os.path.isfile, needed)):
+            continue  # seq_corridor has no true poses
         sequence = Sequence(folder)
         with tv.Context(max_width=sequence.camera.width,
                         max_height=sequence.camera.height) as context:
