@@ -2,6 +2,7 @@
 #include "match/align.h"
 
 #include "api/validate.h"
+#include "feature/tilts.h"
 #include "match/rank.h"
 #include "twoview/match.h"
 
@@ -55,7 +56,7 @@ tv_status tv_align_matches(tv_context* context, const tv_image images[2],
   }
   if (num_matches > 0 && (matches == nullptr || aligned == nullptr)) return TV_ERR_NULL;
   if (!tv::is_finite(size_of_one)) return TV_ERR_NOT_FINITE;
-  if (num_matches < 0 || !(size_of_one > 0) || size_of_one > tv::kMaxKeypointSize) {
+  if (num_matches < 0 || !(size_of_one > 0) || size_of_one > tv::kMostKeypointSize) {
     return TV_ERR_ARGUMENT;
   }
   tv::Bytes arrays[6];

@@ -1,20 +1,17 @@
-// The entry points of features: they validate, run detection, orientation and description over one
-// pyramid, and write the results that fit.
+// The entry points of features: they validate, call pipeline/extract.h, and write the results that
+// fit.
 #include "twoview/feature.h"
 
 #include <algorithm>
 
-#include "api/extract.h"
 #include "api/sized.h"
 #include "api/validate.h"
-#include "feature/corners.h"
-#include "feature/describe.h"
+#include "feature/sigmas.h"
 #include "feature/tilts.h"
+#include "pipeline/extract.h"
 
 namespace tv {
 namespace {
-
-constexpr uint32_t kSigmaSlots = 8;  // levels whose last sigma tv_keypoint_sigmas remembers
 
 constexpr tv_feature_options kDefaults = {
     sizeof(tv_feature_options), 0,    12, 15, 3, 4, 1.41f, 48, 1, TV_ORIENTATION_GRADIENT,
@@ -41,46 +38,6 @@ Request check_request(const tv_context* context, const tv_image* image, const tv
   return request;
 }
 
-tv_keypoint* detect_into_arena(tv_context* context, const tv_image& image, const tv_image* mask,
-                               const tv_feature_options& options, int32_t* count) {
-  StageTimer timer(context, TV_STAGE_DETECT);
-  tv_keypoint* corners =
-      arena_alloc<tv_keypoint>(context->arena, static_cast<size_t>(options.max_keypoints));
-  *count = find_corners(*context->kernels, image, mask, options, options.max_keypoints,
-                        context->arena, corners);
-  return corners;
-}
-
-Octaves octaves_for(tv_context* context, const tv_image& image, int32_t pooling,
-                    const tv_keypoint* keypoints, int32_t count) {
-  StageTimer timer(context, TV_STAGE_PYRAMID);
-  const OctaveRange range = octave_range(keypoints, count, pooling);
-  return make_octaves(*context->kernels, image, range.first, range.last, context->arena);
-}
-
-// Writes as many oriented keypoints as fit; returns how many there are in all. At most max_seconds
-// second orientations are kept: those that come first in the order of the keypoints. upright_rad:
-// the angle of upright ones.
-int32_t orient_keypoints(const tv_context& context, const Octaves& octaves, int32_t orientation,
-                         float upright_rad, const tv_keypoint* keypoints, int32_t count,
-                         int32_t max_seconds, tv_keypoint* oriented, int32_t capacity) {
-  int32_t total = 0, seconds = 0;
-  for (int32_t k = 0; k < count; ++k) {
-    float angles_rad[2] = {upright_rad, 0.0f};
-    int32_t peaks = 1;
-    if (orientation == TV_ORIENTATION_GRADIENT) {
-      peaks = dominant_angles(*context.kernels, octaves, keypoints[k], angles_rad);
-    }
-    if (peaks == 2 && ++seconds > max_seconds) peaks = 1;
-    for (int32_t p = 0; p < peaks; ++p, ++total) {
-      if (total >= capacity) continue;
-      oriented[total] = keypoints[k];
-      oriented[total].angle_rad = angles_rad[p];
-    }
-  }
-  return total;
-}
-
 size_t bytes_of(int32_t count, size_t element) { return static_cast<size_t>(count) * element; }
 
 Bytes bytes_of(const tv_keypoint* keypoints, int32_t count) {
@@ -95,27 +52,6 @@ bool overlaps_any(Bytes out, Bytes other, const tv_image* image, const tv_image*
 }
 
 }  // namespace
-
-int32_t extract_keypoints(tv_context* context, const tv_image& image, const tv_image* mask,
-                          const tv_feature_options& options, float upright_rad,
-                          tv_keypoint* keypoints, uint8_t* descriptors, int32_t capacity) {
-  ArenaScope scope(context->arena);
-  int32_t num_corners = 0;
-  const tv_keypoint* corners = detect_into_arena(context, image, mask, options, &num_corners);
-  const Octaves octaves = octaves_for(context, image, options.pooling, corners, num_corners);
-  StageTimer timer(context, TV_STAGE_DESCRIBE);
-  tv_keypoint* oriented =
-      arena_alloc<tv_keypoint>(context->arena, static_cast<size_t>(options.max_keypoints));
-  const int32_t count =
-      orient_keypoints(*context, octaves, options.orientation, upright_rad, corners, num_corners,
-                       options.max_keypoints - num_corners, oriented, options.max_keypoints);
-  if (count > capacity) return count;
-  std::copy(oriented, oriented + count, keypoints);
-  describe_keypoints(*context->kernels, octaves, keypoints, count, options.descriptor,
-                     options.pooling, descriptors);
-  return count;
-}
-
 }  // namespace tv
 
 void tv_features_init_sized(tv_features* features, size_t struct_size) {
@@ -138,8 +74,7 @@ tv_status tv_detect(tv_context* context, const tv_image* image, const tv_image* 
   }
   tv::ArenaScope scope(context->arena);
   int32_t count = 0;
-  const tv_keypoint* corners =
-      tv::detect_into_arena(context, *image, mask, request.options, &count);
+  const tv_keypoint* corners = tv::detect_image(context, *image, mask, request.options, &count);
   *num_keypoints = count;
   if (count > cap_keypoints) return TV_ERR_CAPACITY;
   std::copy(corners, corners + count, keypoints);
@@ -162,17 +97,9 @@ tv_status tv_orient(tv_context* context, const tv_image* image, const tv_keypoin
   }
   const tv_status status = tv::check_keypoints(keypoints, num_keypoints);
   if (status != TV_OK) return status;
-  tv::ArenaScope scope(context->arena);
-  const tv::Octaves octaves = tv::octaves_for(context, *image, 0, keypoints, num_keypoints);
-  tv::StageTimer timer(context, TV_STAGE_DESCRIBE);
-  const int32_t orientation = request.options.orientation;
-  const int32_t total = tv::orient_keypoints(*context, octaves, orientation, 0.0f, keypoints,
-                                             num_keypoints, num_keypoints, nullptr, 0);
-  *num_oriented = total;
-  if (total > cap_oriented) return TV_ERR_CAPACITY;
-  tv::orient_keypoints(*context, octaves, orientation, 0.0f, keypoints, num_keypoints,
-                       num_keypoints, oriented, cap_oriented);
-  return TV_OK;
+  *num_oriented = tv::orient_image(context, *image, keypoints, num_keypoints, request.options,
+                                   oriented, cap_oriented);
+  return *num_oriented > cap_oriented ? TV_ERR_CAPACITY : TV_OK;
 }
 
 tv_status tv_describe(tv_context* context, const tv_image* image, const tv_keypoint* keypoints,
@@ -189,12 +116,7 @@ tv_status tv_describe(tv_context* context, const tv_image* image, const tv_keypo
   }
   const tv_status status = tv::check_keypoints(keypoints, num_keypoints);
   if (status != TV_OK) return status;
-  tv::ArenaScope scope(context->arena);
-  const tv::Octaves octaves =
-      tv::octaves_for(context, *image, request.options.pooling, keypoints, num_keypoints);
-  tv::StageTimer timer(context, TV_STAGE_DESCRIBE);
-  tv::describe_keypoints(*context->kernels, octaves, keypoints, num_keypoints,
-                         request.options.descriptor, request.options.pooling, descriptors);
+  tv::describe_image(context, *image, keypoints, num_keypoints, request.options, descriptors);
   return TV_OK;
 }
 
@@ -213,8 +135,8 @@ tv_status tv_extract(tv_context* context, const tv_image* image, const tv_image*
   if (tv::overlaps_any(keypoints_out, out, image, mask) || tv::overlaps_any(out, {}, image, mask)) {
     return TV_ERR_OVERLAP;
   }
-  *num_keypoints = tv::extract_keypoints(context, *image, mask, request.options, 0.0f, keypoints,
-                                         descriptors, cap_keypoints);
+  *num_keypoints = tv::extract_image(context, *image, mask, request.options, 0.0f, keypoints,
+                                     descriptors, cap_keypoints);
   return *num_keypoints > cap_keypoints ? TV_ERR_CAPACITY : TV_OK;
 }
 
@@ -242,7 +164,7 @@ tv_status tv_keypoint_sigmas(const tv_keypoint* keypoints, int32_t num_keypoints
                              double exponent, float* sigmas) {
   if (num_keypoints > 0 && (keypoints == nullptr || sigmas == nullptr)) return TV_ERR_NULL;
   if (!tv::is_finite(size_of_one) || !tv::is_finite(exponent)) return TV_ERR_NOT_FINITE;
-  if (num_keypoints < 0 || !(size_of_one > 0) || size_of_one > tv::kMaxKeypointSize ||
+  if (num_keypoints < 0 || !(size_of_one > 0) || size_of_one > tv::kMostKeypointSize ||
       !(exponent >= 0) || exponent > tv::kMostSigmaExponent) {
     return TV_ERR_ARGUMENT;
   }
@@ -252,18 +174,7 @@ tv_status tv_keypoint_sigmas(const tv_keypoint* keypoints, int32_t num_keypoints
   if (tv::overlap(sigmas, n * sizeof(float), keypoints, n * sizeof(tv_keypoint))) {
     return TV_ERR_OVERLAP;
   }
-  // Keypoints of a level have the same size: the last one of each level gives the next one's sigma.
-  float sizes[tv::kSigmaSlots] = {}, of_sizes[tv::kSigmaSlots] = {};
-  for (size_t k = 0; k < n; ++k) {
-    const float size = keypoints[k].size;
-    const uint32_t slot = static_cast<uint32_t>(keypoints[k].level) % tv::kSigmaSlots;
-    if (size != sizes[slot]) {
-      const double ratio = static_cast<double>(size) / size_of_one;
-      const float sigma = static_cast<float>(tv::exp(exponent * tv::log(ratio)));
-      sizes[slot] = size;
-      of_sizes[slot] = std::max(tv::kLeastSigma, std::min(sigma, tv::kLargestSigma));
-    }
-    sigmas[k] = of_sizes[slot];
-  }
+  tv::KeypointSigmas of_size(size_of_one, exponent);
+  for (size_t k = 0; k < n; ++k) sigmas[k] = of_size.of(keypoints[k]);
   return TV_OK;
 }

@@ -7,18 +7,18 @@
 #include <cstddef>
 #include <cstring>
 
-#include "api/extract.h"
 #include "api/scratch.h"
 #include "api/sized.h"
 #include "api/two_view.h"
 #include "api/validate.h"
 #include "api/within.h"
+#include "feature/sigmas.h"
 #include "feature/tilts.h"
 #include "geometry/essential.h"
-#include "image/pyramid.h"
 #include "match/align.h"
 #include "match/rank.h"
 #include "match/witness.h"
+#include "pipeline/extract.h"
 #include "robust/verdict.h"
 #include "triangulation/triangulation.h"
 #include "twoview/bundle.h"
@@ -75,30 +75,6 @@ Results alloc_results(Arena& arena, const tv_limits& limits) {
   return r;
 }
 
-// The sigmas of keypoints that tv_extract made. Those of a level have one size, so that a logarithm
-// and an exponential a level suffice.
-class SigmasOfLevels {
- public:
-  SigmasOfLevels(float size_of_one, double exponent)
-      : size_of_one_(size_of_one), exponent_(exponent) {}
-  float of(const tv_keypoint& keypoint) {
-    OfLevel& known = levels_[keypoint.level];
-    if (known.size != keypoint.size) {
-      tv_keypoint_sigmas(&keypoint, 1, size_of_one_, exponent_, &known.sigma);
-      known.size = keypoint.size;
-    }
-    return known.sigma;
-  }
-
- private:
-  struct OfLevel {
-    float size, sigma;
-  };
-  OfLevel levels_[kMaxLevels] = {};
-  float size_of_one_;
-  double exponent_;
-};
-
 // Writes the pixels, ratios and sigmas of the matches, and r.pairs.
 void gather_pixels(Results& r, const tv_correspondence* matches, int32_t num_matches) {
   r.pairs = {sizeof r.pairs, num_matches, r.pixels[0], r.pixels[1], r.ratios, nullptr, nullptr};
@@ -106,7 +82,7 @@ void gather_pixels(Results& r, const tv_correspondence* matches, int32_t num_mat
     r.pairs.sigmas0 = r.sigmas[0];
     r.pairs.sigmas1 = r.sigmas[1];
   }
-  SigmasOfLevels sigmas(r.keypoint_size, r.sigma_by_size);
+  KeypointSigmas sigmas(r.keypoint_size, r.sigma_by_size);
   for (int32_t k = 0; k < num_matches; ++k) {
     const tv_correspondence& m = matches[k];
     const tv_keypoint& a = r.keypoints[0][m.idx0];

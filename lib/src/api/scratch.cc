@@ -48,7 +48,7 @@ size_t reconstruct_result_bytes(const tv_limits& limits) {
          arena_bytes<tv_two_view>(1);
 }
 
-// The bytes that extract_rung (api/extract.h) takes.
+// The bytes that extract_rung (pipeline/extract.h) takes.
 size_t extract_rung_bytes(const tv_limits& limits, int32_t rung) {
   tv_limits of_view = limits;
   of_view.max_keypoints = view_budget(rung, 0, limits.max_keypoints);

@@ -4,6 +4,7 @@
 
 #include "api/sized.h"
 #include "api/within.h"
+#include "feature/tilts.h"
 
 namespace tv {
 namespace {
@@ -115,7 +116,7 @@ tv_status check_keypoints(const tv_keypoint* keypoints, int32_t count) {
     }
     if (!within(p.x, -kMaxCoordinate, kMaxCoordinate) ||
         !within(p.y, -kMaxCoordinate, kMaxCoordinate) || p.size <= 0.0f ||
-        p.size > kMaxKeypointSize || !within(p.angle_rad, -1000.0f, 1000.0f)) {
+        p.size > kMostKeypointSize || !within(p.angle_rad, -1000.0f, 1000.0f)) {
       return TV_ERR_ARGUMENT;
     }
   }

@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "base/math.h"
+#include "feature/sigmas.h"
 #include "pipeline/context.h"
 #include "twoview/feature.h"
 #include "twoview/two_view.h"
@@ -35,13 +36,6 @@ tv_status read_feature_options(const tv_context& context, const tv_feature_optio
 // keypoints are not, and neither may overlap the output.
 tv_status read_features(const tv_context& context, const tv_features* given, uint32_t purpose,
                         const void* out, size_t out_bytes, tv_features* features);
-
-// The size of a keypoint on level 7 with the largest option keypoint_size.
-inline constexpr float kMaxKeypointSize = 4096.0f;
-
-// The range of a pixel's sigma, and of the exponent by which a keypoint's size gives it.
-inline constexpr double kMostSigmaExponent = 2;
-inline constexpr float kLeastSigma = 0.01f, kLargestSigma = 1000.0f;
 
 // Checks the caller's struct of matched pixels but for its sigmas, and copies it to *pairs.
 tv_status read_pixels(const tv_pixel_pairs* given, tv_pixel_pairs* pairs);

@@ -16,7 +16,9 @@ inline constexpr int32_t kNumTilts = 17;  // views of the highest rung; tilt 0 i
 // The widest and the highest view, which is that of an image: larger squeezed ones are left out.
 inline constexpr int32_t kMaxViewSide = 16384;
 inline constexpr int32_t kMostRungKeypoints = 65535;  // their indices have 16 bits
-inline constexpr float kMostKeypointSize = 4096;      // pixels, of a mapped keypoint
+// Pixels: the size of a keypoint on level 7 with the largest option keypoint_size, and the most of
+// a mapped keypoint.
+inline constexpr float kMostKeypointSize = 4096;
 
 // How many tilts a rung has: 0 .. tilts_of_rung - 1.
 int32_t tilts_of_rung(int32_t rung);
