@@ -19,6 +19,7 @@
 #include "match/rank.h"
 #include "match/witness.h"
 #include "pipeline/extract.h"
+#include "pipeline/pair_result.h"
 #include "robust/verdict.h"
 #include "triangulation/triangulation.h"
 #include "twoview/bundle.h"
@@ -233,6 +234,20 @@ void keep_pair(const tv_two_view& estimate, const tv_view& view0, const tv_view&
   if (is_full_pose(estimate)) tv_corrected_pair(&estimate, view0.camera, view1.camera, r.pair);
 }
 
+// Estimates from r.pairs. Not inlined, so that its stack frame is not in use elsewhere.
+__attribute__((noinline)) void estimate_matches(tv_context* context, const Task& task,
+                                                const Results& r, uint8_t* inlier_mask,
+                                                tv_two_view* result, Evidence* evidence) {
+  ArenaScope scope(context->arena);
+  *evidence = Evidence{};
+  PairEstimate estimate{};
+  estimate.problem.options = task.estimate;
+  estimate.outcome.evidence = evidence;
+  estimate_pair(context, task.views[0].camera, task.views[1].camera, r.pairs, &estimate);
+  write_estimate(estimate, result);
+  write_inliers(estimate, inlier_mask);
+}
+
 // Writes the guided matches of an estimate to r.more_matches. Not inlined, so that its stack frame
 // is not in use during the second estimate.
 __attribute__((noinline)) tv_status match_guided(tv_context* context,
@@ -269,11 +284,7 @@ __attribute__((noinline)) tv_status match_along_lines(tv_context* context, const
   const int32_t left_out = keep_best(r.more_matches, limits.max_matches, &count);
   gather_pixels(r, r.more_matches, count);
   tv_two_view& again = *r.more_estimate;
-  again = *estimate;
-  attempt.evidence = Evidence{};
-  status = estimate_two_view(context, task.views[0].camera, task.views[1].camera, &r.pairs,
-                             &task.estimate, &again, r.more_inlier_mask, &attempt.evidence);
-  if (status != TV_OK) return status;
+  estimate_matches(context, task, r, r.more_inlier_mask, &again, &attempt.evidence);
   if (!takes_guided_estimate(*estimate, attempt.judgement.verdict, judge(attempt.evidence).verdict,
                              &again)) {
     gather_pixels(r, r.matches, *num_matches);
@@ -397,8 +408,9 @@ __attribute__((noinline)) tv_status read_task(const tv_context& context, Task* t
       return TV_ERR_OVERLAP;
     }
   }
-  tv_estimate_options_init(&task->estimate);
-  return read_sized(task->options.estimate, &task->estimate);
+  const tv_camera* const camera0 = task->views[0].camera;
+  status = read_estimate_options(task->options.estimate, camera0 != nullptr, &task->estimate);
+  return status != TV_OK ? status : check_cameras(camera0, task->views[1].camera);
 }
 
 // Extracts the keypoints of both views and matches them. Not inlined, so that its stack frame is
@@ -502,13 +514,8 @@ tv_status run_rung(tv_context* context, const Task& task, Results& r, Attempt* a
     if (status != TV_OK) return status;
   }
   gather_pixels(r, r.matches, attempt->num_matches);
-  tv_two_view& estimate = attempt->estimate;
-  tv_two_view_init(&estimate);
-  attempt->evidence = Evidence{};
-  status = estimate_two_view(context, task.views[0].camera, task.views[1].camera, &r.pairs,
-                             &task.estimate, &estimate, r.inlier_mask, &attempt->evidence);
-  if (status != TV_OK) return status;
-  keep_pair(estimate, task.views[0], task.views[1], r);
+  estimate_matches(context, task, r, r.inlier_mask, &attempt->estimate, &attempt->evidence);
+  keep_pair(attempt->estimate, task.views[0], task.views[1], r);
   judge_attempt(context, task, r, attempt);
   return TV_OK;
 }

@@ -60,10 +60,4 @@ void write_sized(const void* packed, size_t known_size, void* object) {
   init_sized(object, size_of(object), packed, known_size);
 }
 
-void write_part(const void* part, size_t bytes, size_t offset, void* object) {
-  const size_t size = size_of(object);
-  if (offset >= size) return;
-  std::memcpy(static_cast<uint8_t*>(object) + offset, part, smaller(bytes, size - offset));
-}
-
 }  // namespace tv

@@ -36,9 +36,6 @@ tv_status read_sized(const Struct* object, Struct* checked) {
 // Writes an output as far as its struct_size reaches, and keeps this struct_size.
 void write_sized(const void* packed, size_t known_size, void* object);
 
-// Writes `bytes` bytes of an output at an offset, as far as its struct_size reaches.
-void write_part(const void* part, size_t bytes, size_t offset, void* object);
-
 template <typename Struct>
 void write_sized(const Struct& packed, Struct* object) {
   write_sized(&packed, sizeof(Struct), object);

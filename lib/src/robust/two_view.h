@@ -23,7 +23,7 @@ struct TwoViewModel {
 };
 
 // All that the entry point writes to the caller's result: models on rays, and the views in the
-// canonical order that api/two_view.cc chooses.
+// canonical order that pipeline/two_view.cc chooses.
 struct TwoViewOutcome {
   Evidence* evidence = nullptr;  // what the pair is judged by, with its kind; the caller's
   EpipolarModel epipolar;
