@@ -17,4 +17,11 @@ tv_status check_pair(const tv_camera_pair& pair) {
   return is_rotation(R) && moves ? TV_OK : TV_ERR_ARGUMENT;
 }
 
+tv_status check_optional_cameras(const tv_camera* camera0, const tv_camera* camera1) {
+  if ((camera0 == nullptr) != (camera1 == nullptr)) return TV_ERR_ARGUMENT;
+  if (camera0 == nullptr) return TV_OK;
+  const tv_status status = tv_camera_check(camera0);
+  return status != TV_OK ? status : tv_camera_check(camera1);
+}
+
 }  // namespace tv

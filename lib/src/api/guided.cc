@@ -1,14 +1,13 @@
-// The entry point of guided matching: it validates, computes the keypoints' rays, and calls
-// match/guided.h.
-#include "match/guided.h"
+// The entry point of guided matching: it validates, calls pipeline/guided.h, and writes the matches
+// that fit.
+#include "pipeline/guided.h"
 
 #include <algorithm>
 
-#include "api/scratch.h"
+#include "api/camera_pair.h"
 #include "api/sized.h"
 #include "api/validate.h"
 #include "api/within.h"
-#include "geometry/camera.h"
 
 namespace tv {
 namespace {
@@ -26,29 +25,7 @@ tv_status read_guided_options(const tv_guided_options* options, tv_guided_option
   return valid ? TV_OK : TV_ERR_ARGUMENT;
 }
 
-// Reads the keypoints of one view. Without a camera (null) the ray of a pixel is (x, y, 1).
-GuidedView make_view(const tv_camera* camera, const tv_features& features, Arena& arena) {
-  const tv_keypoint* const keypoints = features.keypoints;
-  const size_t n = static_cast<size_t>(features.num);
-  double* rays = arena_alloc<double>(arena, 3 * n);
-  double* slopes = arena_alloc<double>(arena, 6 * n);
-  uint8_t* valid = arena_alloc<uint8_t>(arena, n);
-  const Camera prepared = camera != nullptr ? prepare_camera(*camera) : Camera{};
-  for (size_t k = 0; k < n; ++k) {
-    const Vec2 pixel(keypoints[k].x, keypoints[k].y);
-    Vec3 ray(pixel[0], pixel[1], 1);
-    Mat32 slope;
-    slope << 1, 0, 0, 1, 0, 0;
-    valid[k] = camera == nullptr || unproject(prepared, pixel, &ray, &slope);
-    double* const to = rays + 3 * k;
-    for (int i = 0; i < 3; ++i) to[i] = ray[i];
-    for (int i = 0; i < 6; ++i) slopes[6 * k + static_cast<size_t>(i)] = slope(i / 2, i % 2);
-  }
-  return GuidedView{keypoints, features.descriptors, rays, slopes, valid, features.num};
-}
-
 }  // namespace
-
 }  // namespace tv
 
 void tv_guided_options_init_sized(tv_guided_options* options, size_t struct_size) {
@@ -63,28 +40,13 @@ tv_status tv_match_guided(tv_context* context, const tv_epipolar* epipolar,
       (correspondences == nullptr && cap_correspondences > 0)) {
     return TV_ERR_NULL;
   }
-  const tv_camera *const camera0 = epipolar->camera0, *const camera1 = epipolar->camera1;
-  const double* const matrix = epipolar->matrix;
   tv_guided_options checked;
   tv_status status = tv::read_guided_options(options, &checked);
   if (status != TV_OK) return status;
-  if (cap_correspondences < 0 || (camera0 == nullptr) != (camera1 == nullptr)) {
-    return TV_ERR_ARGUMENT;
-  }
-  // The scale of the matrix is arbitrary; with a largest entry of 1 its squares stay within a
-  // double's range.
-  double scaled[9], largest = 0;
-  for (int k = 0; k < 9; ++k) {
-    if (!tv::is_finite(matrix[k])) return TV_ERR_NOT_FINITE;
-    const double size = matrix[k] < 0 ? -matrix[k] : matrix[k];
-    largest = size > largest ? size : largest;
-  }
-  for (int k = 0; k < 9; ++k) scaled[k] = largest > 0 ? matrix[k] / largest : 0;
-  if (camera0 != nullptr) {
-    status = tv_camera_check(camera0);
-    if (status == TV_OK) status = tv_camera_check(camera1);
-    if (status != TV_OK) return status;
-  }
+  if (cap_correspondences < 0) return TV_ERR_ARGUMENT;
+  if (!tv::all_finite(epipolar->matrix, 9)) return TV_ERR_NOT_FINITE;
+  status = tv::check_optional_cameras(epipolar->camera0, epipolar->camera1);
+  if (status != TV_OK) return status;
   const size_t out_bytes = static_cast<size_t>(cap_correspondences) * sizeof(tv_correspondence);
   const tv_features* const given[2] = {features0, features1};
   tv_features features[2];
@@ -96,17 +58,12 @@ tv_status tv_match_guided(tv_context* context, const tv_epipolar* epipolar,
     status = tv::check_keypoints(features[v].keypoints, features[v].num);
     if (status != TV_OK) return status;
   }
-  tv::StageTimer timer(context, TV_STAGE_MATCH);
   tv::ArenaScope scope(context->arena);
-  const int32_t most = std::min(features[0].num, features[1].num);
-  tv_correspondence* found =
-      tv::arena_alloc<tv_correspondence>(context->arena, static_cast<size_t>(most));
-  const tv::GuidedView view0 = tv::make_view(camera0, features[0], context->arena);
-  const tv::GuidedView view1 = tv::make_view(camera1, features[1], context->arena);
+  const tv_correspondence* found = nullptr;
   const int32_t count =
-      tv::match_guided(*context->kernels, view0, view1, scaled, checked, context->arena, found);
+      tv::match_epipolar(context, *epipolar, features[0], features[1], checked, &found);
   *num_correspondences = count;
   if (count > cap_correspondences) return TV_ERR_CAPACITY;
-  for (int32_t k = 0; k < count; ++k) correspondences[k] = found[k];
+  std::copy(found, found + count, correspondences);
   return TV_OK;
 }

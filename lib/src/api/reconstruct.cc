@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstring>
 
+#include "api/camera_pair.h"
 #include "api/scratch.h"
 #include "api/sized.h"
 #include "api/two_view.h"
@@ -410,7 +411,7 @@ __attribute__((noinline)) tv_status read_task(const tv_context& context, Task* t
   }
   const tv_camera* const camera0 = task->views[0].camera;
   status = read_estimate_options(task->options.estimate, camera0 != nullptr, &task->estimate);
-  return status != TV_OK ? status : check_cameras(camera0, task->views[1].camera);
+  return status != TV_OK ? status : check_optional_cameras(camera0, task->views[1].camera);
 }
 
 // Extracts the keypoints of both views and matches them. Not inlined, so that its stack frame is

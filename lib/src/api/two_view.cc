@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "api/camera_pair.h"
 #include "api/sized.h"
 #include "api/validate.h"
 #include "base/math.h"
@@ -110,13 +111,6 @@ tv_status read_estimate_options(const tv_estimate_options* options, bool calibra
              : check_gravity(checked->gravity0, checked->gravity1, checked->gravity_sigma_rad);
 }
 
-tv_status check_cameras(const tv_camera* camera0, const tv_camera* camera1) {
-  if ((camera0 == nullptr) != (camera1 == nullptr)) return TV_ERR_ARGUMENT;
-  if (camera0 == nullptr) return TV_OK;
-  const tv_status status = tv_camera_check(camera0);
-  return status != TV_OK ? status : tv_camera_check(camera1);
-}
-
 }  // namespace tv
 
 void tv_pixel_pairs_init_sized(tv_pixel_pairs* pairs, size_t struct_size) {
@@ -158,7 +152,7 @@ tv_status tv_estimate_two_view(tv_context* context, const tv_camera* camera0,
   if (given.num > context->limits.max_matches || !tv::made_for(*context, TV_PURPOSE_ESTIMATE)) {
     return TV_ERR_LIMITS;
   }
-  status = tv::check_cameras(camera0, camera1);
+  status = tv::check_optional_cameras(camera0, camera1);
   if (status != TV_OK) return status;
   if (tv::arrays_overlap(given, pairs, options, camera0, camera1, result, inlier_mask)) {
     return TV_ERR_OVERLAP;

@@ -1,4 +1,4 @@
-// Checks of two-view estimation that tv_reconstruct shares.
+// The options of two-view estimation, which tv_reconstruct reads, too.
 #pragma once
 
 #include "twoview/two_view.h"
@@ -9,8 +9,5 @@ namespace tv {
 // calibrated: whether there are cameras.
 tv_status read_estimate_options(const tv_estimate_options* options, bool calibrated,
                                 tv_estimate_options* checked);
-
-// Checks two cameras, which may both be null.
-tv_status check_cameras(const tv_camera* camera0, const tv_camera* camera1);
 
 }  // namespace tv
