@@ -126,16 +126,13 @@ struct Attempt {
 // Moves the keypoints of the matches by the pixels around them. A keypoint has at most one match.
 // Matches of guided matching are not aligned. It is called before the estimate, whose inlier mask
 // serves as scratch.
-__attribute__((noinline)) tv_status align_matches(tv_context* context, const tv_view views[2],
-                                                  const int32_t num_keypoints[2],
-                                                  int32_t num_matches, Results& r) {
+void align_found(tv_context* context, const tv_view views[2], int32_t num_matches, Results& r) {
+  StageTimer timer(context, TV_STAGE_MATCH);
   uint8_t* const aligned = r.inlier_mask;
   const tv_image images[2] = {views[0].image, views[1].image};
-  const tv_status status = tv_align_matches(context, images, r.matches, num_matches,
-                                            r.keypoint_size, r.keypoints, num_keypoints, aligned);
-  if (status != TV_OK) return status;
+  align_matches(*context->kernels, images, static_cast<double>(r.keypoint_size), r.keypoints,
+                r.matches, num_matches, aligned);
   for (int32_t k = 0; k < num_matches; ++k) r.aligned[r.matches[k].idx0] = aligned[k];
-  return TV_OK;
 }
 
 // Keeps one match a place of those that squeezed views found several times: the most precise one,
@@ -160,7 +157,7 @@ int32_t merge_places(const Results& r, Arena& arena, const tv_correspondence* al
   return keep_witnesses(r.keypoints, variances, matches, num_matches, arena);
 }
 
-// The same as align_matches on rungs with squeezed views, whose patches begin where their shapes
+// The same as align_found on rungs with squeezed views, whose patches begin where their shapes
 // map them; then one match a place is kept. *num_matches becomes the number of those.
 __attribute__((noinline)) void align_and_merge(tv_context* context, const Task& task, Results& r,
                                                int32_t* num_matches) {
@@ -511,8 +508,7 @@ tv_status run_rung(tv_context* context, const Task& task, Results& r, Attempt* a
   if (has_tilts) align_and_merge(context, task, r, &attempt->num_matches);
   attempt->num_left_out = keep_best(r.matches, context->limits.max_matches, &attempt->num_matches);
   if (!has_tilts && task.options.align_matches != 0) {
-    status = align_matches(context, task.views, attempt->num_keypoints, attempt->num_matches, r);
-    if (status != TV_OK) return status;
+    align_found(context, task.views, attempt->num_matches, r);
   }
   gather_pixels(r, r.matches, attempt->num_matches);
   estimate_matches(context, task, r, r.inlier_mask, &attempt->estimate, &attempt->evidence);

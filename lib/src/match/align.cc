@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/math.h"
+#include "match/rank.h"
 
 namespace tv {
 namespace {
@@ -192,6 +193,10 @@ uint8_t factor_of(const Template& t, double alike, double sample) {
   return static_cast<uint8_t>((factor < kMost ? factor : kMost) + 0.5);
 }
 
+bool is_at_same_place(const tv_keypoint& a, const tv_keypoint& b) {
+  return a.x == b.x && a.y == b.y && a.size == b.size;
+}
+
 }  // namespace
 
 uint8_t align_keypoints(const tvk_set& set, const tv_image& image0, const tv_image& image1,
@@ -266,6 +271,34 @@ uint8_t align_keypoints(const tvk_set& set, const tv_image& image0, const tv_ima
   moving.x = static_cast<float>(x);
   moving.y = static_cast<float>(y);
   return factor_of(t, alike, step * size_of_one / static_cast<double>(fixed.size));
+}
+
+void align_matches(const tvk_set& set, const tv_image images[2], double size_of_one,
+                   tv_keypoint* const keypoints[2], const tv_correspondence* matches,
+                   int32_t num_matches, uint8_t* aligned) {
+  for (int32_t k = 0; k < num_matches; ++k) {
+    const tv_correspondence* m = &matches[k];
+    const tv_correspondence* other = nullptr;
+    if (k + 1 < num_matches && rank_of(m[0]) != rank_of(m[1]) &&
+        is_at_same_place(keypoints[0][m[0].idx0], keypoints[0][m[1].idx0]) &&
+        is_at_same_place(keypoints[1][m[0].idx1], keypoints[1][m[1].idx1])) {
+      const bool first = rank_of(m[0]) < rank_of(m[1]);
+      other = m + first;
+      m += !first;
+      ++k;
+    }
+    tv_keypoint& a = keypoints[0][m->idx0];
+    tv_keypoint& b = keypoints[1][m->idx1];
+    aligned[k] = align_keypoints(set, images[0], images[1], size_of_one, &a, &b);
+    if (other == nullptr) continue;
+    aligned[k - 1] = aligned[k];
+    for (int v = 0; v < 2; ++v) {
+      const tv_keypoint& moved = v == 0 ? a : b;
+      tv_keypoint& follower = keypoints[v][v == 0 ? other->idx0 : other->idx1];
+      follower.x = moved.x;
+      follower.y = moved.y;
+    }
+  }
 }
 
 }  // namespace tv

@@ -5,6 +5,7 @@
 #include "kernels/kernels.h"
 #include "twoview/feature.h"
 #include "twoview/image.h"
+#include "twoview/match.h"
 
 namespace tv {
 
@@ -25,5 +26,12 @@ inline constexpr int kAlignedOne = 128;
 uint8_t align_keypoints(const tvk_set& set, const tv_image& image0, const tv_image& image1,
                         double size_of_one, tv_keypoint* keypoint0, tv_keypoint* keypoint1,
                         const double (*shapes)[4] = nullptr);
+
+// The same for each match; writes to `aligned` what align_keypoints returns. A corner with two
+// directions has two keypoints in turn, and two corners may have two matches, which are one to the
+// estimate: the match of lower rank is aligned, and the other one moves with it.
+void align_matches(const tvk_set& set, const tv_image images[2], double size_of_one,
+                   tv_keypoint* const keypoints[2], const tv_correspondence* matches,
+                   int32_t num_matches, uint8_t* aligned);
 
 }  // namespace tv
