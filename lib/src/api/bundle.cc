@@ -1,5 +1,5 @@
 // The entry points of bundle adjustment and of points' covariances: they validate, call
-// robust/bundle.h and robust/point_covariance.h, and write the results.
+// pipeline/bundle.h and robust/point_covariance.h, and write the results.
 #include "twoview/bundle.h"
 
 #include <cmath>
@@ -8,7 +8,7 @@
 #include "api/camera_pair.h"
 #include "api/sized.h"
 #include "api/validate.h"
-#include "robust/bundle.h"
+#include "pipeline/bundle.h"
 #include "robust/point_covariance.h"
 
 namespace tv {
@@ -29,19 +29,12 @@ tv_status read_bundle_options(const tv_bundle_options* options, tv_bundle_option
   return valid ? TV_OK : TV_ERR_ARGUMENT;
 }
 
-// Reads the motion of a pair, which check_pair has checked, with t of unit length, and |t| to
-// *baseline, which must be a number.
-tv_status read_motion(const tv_camera_pair& pair, Pose* pose, double* baseline) {
-  const double* const t = pair.cam1_from_cam0_t;
-  double largest = 0.0;
-  for (int i = 0; i < 3; ++i) largest = std::fabs(t[i]) > largest ? std::fabs(t[i]) : largest;
-  const double x = t[0] / largest, y = t[1] / largest, z = t[2] / largest;
-  const double length = std::sqrt(x * x + y * y + z * z);
-  *baseline = largest * length;
-  if (!is_finite(*baseline)) return TV_ERR_ARGUMENT;
-  pose->t = Vec3(x / length, y / length, z / length);
-  for (int i = 0; i < 9; ++i) pose->R(i / 3, i % 3) = pair.cam1_from_cam0_R[i];
-  return TV_OK;
+// Checks a pair, and reads its motion, whose baseline must be a number.
+tv_status read_pair(const tv_camera_pair& pair, Motion* motion) {
+  const tv_status status = check_pair(pair);
+  if (status != TV_OK) return status;
+  *motion = read_motion(pair);
+  return is_finite(motion->baseline) ? TV_OK : TV_ERR_ARGUMENT;
 }
 
 double rms(double sum_sq, int num_points) {
@@ -85,16 +78,14 @@ tv_status tv_adjust_two_view(tv_context* context, const tv_pixel_pairs* pixels,
   if (status == TV_OK && result != nullptr) status = tv::check_sized(result);
   if (status != TV_OK) return status;
   if (matches.num > 0 && points == nullptr) return TV_ERR_NULL;
-  tv::BundleProblem problem{};
-  status = tv::read_bundle_options(options, &problem.options);
+  tv_bundle_options checked;
+  status = tv::read_bundle_options(options, &checked);
   if (status != TV_OK) return status;
   if (matches.num > context->limits.max_matches || !tv::made_for(*context, TV_PURPOSE_ADJUST)) {
     return TV_ERR_LIMITS;
   }
-  status = tv::check_pair(*pair);
-  tv::Pose pose;
-  double baseline;
-  if (status == TV_OK) status = tv::read_motion(*pair, &pose, &baseline);
+  tv::Motion motion;
+  status = tv::read_pair(*pair, &motion);
   if (status != TV_OK) return status;
   const size_t n = static_cast<size_t>(matches.num);
   const tv::Bytes arrays[9] = {{points, n * sizeof(tv_point)},
@@ -107,20 +98,8 @@ tv_status tv_adjust_two_view(tv_context* context, const tv_pixel_pairs* pixels,
                                {matches.sigmas0, n * sizeof(float)},
                                {matches.sigmas1, n * sizeof(float)}};
   if (tv::outputs_overlap(arrays, 3, 9)) return TV_ERR_OVERLAP;
-  tv::StageTimer timer(context, TV_STAGE_REFINE);
-  problem.camera[0] = tv::prepare_camera(pair->camera0);
-  problem.camera[1] = tv::prepare_camera(pair->camera1);
-  problem.pixels[0] = matches.pixels0;
-  problem.pixels[1] = matches.pixels1;
-  problem.sigmas[0] = matches.sigmas0;
-  problem.sigmas[1] = matches.sigmas1;
-  problem.num = matches.num;
   tv::BundleOutcome outcome;
-  tv::adjust_two_view(problem, pose, baseline, context->arena, points, &outcome);
-  if (outcome.moved) {  // if the pose has not changed, R and t keep their bits
-    for (int i = 0; i < 9; ++i) pair->cam1_from_cam0_R[i] = outcome.pose.R(i / 3, i % 3);
-    for (int i = 0; i < 3; ++i) pair->cam1_from_cam0_t[i] = baseline * outcome.pose.t[i];
-  }
+  tv::adjust_pair(context, matches, checked, motion, pair, points, &outcome);
   if (result != nullptr) tv::pack(outcome, result);
   return TV_OK;
 }
@@ -134,10 +113,8 @@ tv_status tv_point_covariances(const tv_camera_pair* pair, const tv_point* point
   if (!tv::is_finite(noise_px)) return TV_ERR_NOT_FINITE;
   if (pose_covariance != nullptr && !tv::all_finite(pose_covariance, 25)) return TV_ERR_NOT_FINITE;
   if (num_points < 0 || noise_px < 0 || noise_px > tv::kLargest) return TV_ERR_ARGUMENT;
-  tv_status status = tv::check_pair(*pair);
-  tv::Pose pose;
-  double baseline;
-  if (status == TV_OK) status = tv::read_motion(*pair, &pose, &baseline);
+  tv::Motion motion;
+  const tv_status status = tv::read_pair(*pair, &motion);
   if (status != TV_OK) return status;
   const size_t n = static_cast<size_t>(num_points);
   const tv::Bytes arrays[4] = {{covariances, 9 * n * sizeof(double)},
@@ -147,9 +124,9 @@ tv_status tv_point_covariances(const tv_camera_pair* pair, const tv_point* point
   if (tv::outputs_overlap(arrays, 1, 4)) return TV_ERR_OVERLAP;
   const tv::Camera cameras[2] = {tv::prepare_camera(pair->camera0),
                                  tv::prepare_camera(pair->camera1)};
-  const tv::BundleFrame frame = tv::bundle_frame(pose);
+  const tv::BundleFrame frame = tv::bundle_frame(motion.pose);
   for (size_t i = 0; i < n; ++i) {
-    tv::point_covariance(cameras, frame, baseline, pose_covariance, noise_px, points[i],
+    tv::point_covariance(cameras, frame, motion.baseline, pose_covariance, noise_px, points[i],
                          covariances + 9 * i);
   }
   return TV_OK;

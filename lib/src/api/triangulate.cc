@@ -12,14 +12,6 @@
 
 namespace {
 
-tv::TriangulationPair prepare_pair(const tv::Camera &camera0, const tv::Camera &camera1,
-                                   const tv_camera_pair &pair) {
-  const double *const R = pair.cam1_from_cam0_R, *const t = pair.cam1_from_cam0_t;
-  tv::Mat3 rotation;
-  for (int i = 0; i < 9; ++i) rotation(i / 3, i % 3) = R[i];
-  return tv::prepare_triangulation(camera0, camera1, rotation, tv::Vec3(t[0], t[1], t[2]));
-}
-
 tv::Vec2 pixel_at(const double *pixels, size_t i) {
   return tv::Vec2(pixels[2 * i], pixels[2 * i + 1]);
 }
@@ -46,7 +38,7 @@ tv_status tv_triangulate(const tv_camera_pair *pair, const tv_pixel_pairs *pixel
 
   const tv::Camera camera0 = tv::prepare_camera(pair->camera0);
   const tv::Camera camera1 = tv::prepare_camera(pair->camera1);
-  const tv::TriangulationPair prepared = prepare_pair(camera0, camera1, *pair);
+  const tv::TriangulationPair prepared = tv::prepare_triangulation(camera0, camera1, *pair);
   tv::triangulate_points(method, prepared, given.pixels0, given.pixels1, n, points);
   return TV_OK;
 }
@@ -76,7 +68,7 @@ tv_status tv_correct_matches(const tv_camera_pair *pair, const tv_pixel_pairs *p
 
   const tv::Camera camera0 = tv::prepare_camera(pair->camera0);
   const tv::Camera camera1 = tv::prepare_camera(pair->camera1);
-  const tv::TriangulationPair prepared = prepare_pair(camera0, camera1, *pair);
+  const tv::TriangulationPair prepared = tv::prepare_triangulation(camera0, camera1, *pair);
   for (size_t i = 0; i < n; ++i) {
     tv::Vec2 moved[2] = {tv::Vec2(0, 0), tv::Vec2(0, 0)};
     valid[i] = tv::correct_pixels(cost, prepared, pixel_at(given.pixels0, i),

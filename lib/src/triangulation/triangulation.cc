@@ -203,6 +203,14 @@ TriangulationPair prepare_triangulation(const Camera& camera0, const Camera& cam
   return pair;
 }
 
+TriangulationPair prepare_triangulation(const Camera& camera0, const Camera& camera1,
+                                        const tv_camera_pair& pair) {
+  const double *const R = pair.cam1_from_cam0_R, *const t = pair.cam1_from_cam0_t;
+  Mat3 rotation;
+  for (int i = 0; i < 9; ++i) rotation(i / 3, i % 3) = R[i];
+  return prepare_triangulation(camera0, camera1, rotation, Vec3(t[0], t[1], t[2]));
+}
+
 Correction correct_match(tv_triangulation method, const TriangulationPair& pair,
                          const RayFrame& frame0, const RayFrame& frame1) {
   const PixelCost cost =

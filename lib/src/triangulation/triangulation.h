@@ -17,6 +17,9 @@ inline constexpr double kParallelSine = 0x1p-48;
 // R must be a rotation, and t must not be zero.
 TriangulationPair prepare_triangulation(const Camera& camera0, const Camera& camera1, const Mat3& R,
                                         const Vec3& t);
+// The same with the motion of a pair, whose prepared cameras are given.
+TriangulationPair prepare_triangulation(const Camera& camera0, const Camera& camera1,
+                                        const tv_camera_pair& pair);
 
 // Whether the number is a tv_triangulation that this release has.
 bool is_triangulation_method(int method);
