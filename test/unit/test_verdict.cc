@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "pipeline/pair_result.h"
 #include "robust/belief.h"
 #include "robust/verdict.h"
 
@@ -343,23 +344,29 @@ void test_without_an_absolute_pose_there_is_one_reason(void) {
   assert_absolute(TV_REASON_LOW_INLIER_RATIO, e);
 }
 
-void test_after_guided_matching_the_first_measures_stay(void) {
+void test_after_guided_matching_the_first_judgement_stays(void) {
   tv_two_view first{}, again{};
   first.has_R = first.has_t = again.has_R = again.has_t = 1;
   first.kind = again.kind = TV_KIND_CALIBRATED;
   first.num_inliers = again.num_inliers = 50;
-  const tv_verdict doubtful = TV_VERDICT_DOUBTFUL;
+  first.verdict = TV_VERDICT_DOUBTFUL;
+  first.reasons = TV_REASON_LOW_PARALLAX;
   first.num_places = 30;
   first.camera_chi2 = 7;
-  TEST_ASSERT_TRUE(tv::takes_guided_estimate(first, doubtful, TV_VERDICT_OK, &again));
+  again.verdict = TV_VERDICT_OK;
+  TEST_ASSERT_TRUE(tv::takes_guided_estimate(first, again));
+  tv::keep_judgement(first, &again);
   TEST_ASSERT_TRUE(again.num_places == 30 && again.camera_chi2 == 7);
-  TEST_ASSERT_TRUE(tv::takes_guided_estimate(first, doubtful, doubtful, &again));
-  TEST_ASSERT_FALSE(tv::takes_guided_estimate(first, TV_VERDICT_OK, doubtful, &again));
+  TEST_ASSERT_TRUE(again.verdict == first.verdict && again.reasons == first.reasons);
+  TEST_ASSERT_TRUE(tv::takes_guided_estimate(first, again));
+  first.verdict = TV_VERDICT_OK;
+  TEST_ASSERT_FALSE(tv::takes_guided_estimate(first, again));
+  first.verdict = TV_VERDICT_DOUBTFUL;
   again.num_inliers = 49;
-  TEST_ASSERT_FALSE(tv::takes_guided_estimate(first, doubtful, doubtful, &again));
+  TEST_ASSERT_FALSE(tv::takes_guided_estimate(first, again));
   again.num_inliers = 50;
   again.kind = TV_KIND_PLANAR;
-  TEST_ASSERT_FALSE(tv::takes_guided_estimate(first, doubtful, doubtful, &again));
+  TEST_ASSERT_FALSE(tv::takes_guided_estimate(first, again));
 }
 
 }  // namespace
@@ -384,6 +391,6 @@ int main(void) {
   RUN_TEST(test_descriptors_are_evidence_like_the_rest);
   RUN_TEST(test_an_absolute_pose_is_judged_by_the_same_rules);
   RUN_TEST(test_without_an_absolute_pose_there_is_one_reason);
-  RUN_TEST(test_after_guided_matching_the_first_measures_stay);
+  RUN_TEST(test_after_guided_matching_the_first_judgement_stays);
   return UNITY_END();
 }

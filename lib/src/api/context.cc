@@ -3,10 +3,11 @@
 
 #include <algorithm>
 
-#include "api/scratch.h"
 #include "api/sized.h"
 #include "api/within.h"
 #include "feature/tilts.h"
+#include "pipeline/pair_arrays.h"
+#include "pipeline/scratch.h"
 
 namespace tv {
 namespace {

@@ -3,7 +3,6 @@
 
 #include "api/sized.h"
 #include "api/validate.h"
-#include "api/within.h"
 
 namespace {
 
@@ -22,14 +21,10 @@ tv_status tv_match(tv_context* context, const tv_features* features0, const tv_f
       (correspondences == nullptr && cap_correspondences > 0)) {
     return TV_ERR_NULL;
   }
-  tv_match_options checked = kDefaults;
-  tv_status status = tv::read_sized(options, &checked);
+  tv_match_options checked;
+  tv_status status = tv::read_match_options(options, &checked);
   if (status != TV_OK) return status;
-  if (!(checked.ratio > 0.0f && checked.ratio <= 1.0f) ||
-      !tv::within(checked.neighbourhood_px, 0.0f, 1000.0f) ||
-      !tv::within(checked.max_distance, 0.0f, 3000.0f) || cap_correspondences < 0) {
-    return TV_ERR_ARGUMENT;
-  }
+  if (cap_correspondences < 0) return TV_ERR_ARGUMENT;
   const size_t out_bytes = static_cast<size_t>(cap_correspondences) * sizeof(tv_correspondence);
   const tv_features* const given[2] = {features0, features1};
   tv_features features[2];

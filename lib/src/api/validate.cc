@@ -69,6 +69,16 @@ tv_status read_feature_options(const tv_context& context, const tv_feature_optio
   return o.max_keypoints <= most ? TV_OK : TV_ERR_LIMITS;
 }
 
+tv_status read_match_options(const tv_match_options* options, tv_match_options* checked) {
+  tv_match_options_init(checked);
+  const tv_status status = read_sized(options, checked);
+  if (status != TV_OK) return status;
+  const bool valid = checked->ratio > 0.0f && checked->ratio <= 1.0f &&
+                     within(checked->neighbourhood_px, 0.0f, 1000.0f) &&
+                     within(checked->max_distance, 0.0f, 3000.0f);
+  return valid ? TV_OK : TV_ERR_ARGUMENT;
+}
+
 tv_status read_features(const tv_context& context, const tv_features* given, uint32_t purpose,
                         const void* out, size_t out_bytes, tv_features* features) {
   if (given == nullptr) return TV_ERR_NULL;

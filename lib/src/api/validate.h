@@ -10,6 +10,7 @@
 #include "feature/sigmas.h"
 #include "pipeline/context.h"
 #include "twoview/feature.h"
+#include "twoview/match.h"
 #include "twoview/two_view.h"
 
 namespace tv {
@@ -31,6 +32,8 @@ size_t image_bytes(const tv_image& image);
 // Copies the options (or the defaults for null) after checking them.
 tv_status read_feature_options(const tv_context& context, const tv_feature_options* options,
                                tv_feature_options* checked);
+
+tv_status read_match_options(const tv_match_options* options, tv_match_options* checked);
 
 // Checks and copies an image's features for a call of that purpose: descriptors are required,
 // keypoints are not, and neither may overlap the output.

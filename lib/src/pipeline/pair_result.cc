@@ -157,6 +157,23 @@ void write_judgement(const Judgement& judgement, tv_two_view* result) {
   result->probability_wrong = judgement.probability_wrong;
 }
 
+void keep_judgement(const tv_two_view& first, tv_two_view* again) {
+  again->verdict = first.verdict;
+  again->reasons = first.reasons;
+  again->probability_wrong = first.probability_wrong;
+  again->agreement = first.agreement;
+  again->region_shift_rad = first.region_shift_rad;
+  again->num_places = first.num_places;
+  again->camera_chi2 = first.camera_chi2;
+  again->camera_turn_rad = first.camera_turn_rad;
+  again->camera_direction_rad = first.camera_direction_rad;
+  again->principal_point_chi2 = first.principal_point_chi2;
+  std::copy(first.principal_point_asked_px, first.principal_point_asked_px + 2,
+            again->principal_point_asked_px);
+  std::copy(first.principal_point_asked_covariance, first.principal_point_asked_covariance + 3,
+            again->principal_point_asked_covariance);
+}
+
 void write_inliers(const PairEstimate& estimate, uint8_t* inlier_mask) {
   const Matches& matches = estimate.matches;
   std::memset(inlier_mask, 0, static_cast<size_t>(estimate.problem.num));

@@ -10,6 +10,15 @@ namespace tv {
 void write_estimate(const PairEstimate& estimate, tv_two_view* result);
 void write_judgement(const Judgement& judgement, tv_two_view* result);
 
+// Whether the result has a rotation and a translation.
+inline bool is_full_pose(const tv_two_view& result) {
+  return result.has_R != 0 && result.has_t != 0;
+}
+
+// Gives *again, an estimate that takes_guided_estimate accepts, the judgement of the first one, and
+// the measures of evidence that it is from.
+void keep_judgement(const tv_two_view& first, tv_two_view* again);
+
 // Writes a byte for each match: 1 for an inlier, else 0.
 void write_inliers(const PairEstimate& estimate, uint8_t* inlier_mask);
 

@@ -1,6 +1,6 @@
 // What was measured of a pose: all that the verdict and the probability of a wrong pose are decided
 // from. Of a pair robust/evidence.h measures it, and the descriptors of its matches add to it
-// (api/reconstruct.cc); of a camera before known points pose/absolute_pose.h does.
+// (pipeline/rung.h); of a camera before known points pose/absolute_pose.h does.
 #pragma once
 
 #include "base/math.h"

@@ -179,25 +179,10 @@ Judgement judge(const AbsoluteEvidence& e) {
 // of the first. The second estimate is the more accurate one and replaces the first, unless it is
 // of another kind, has fewer inliers, is judged worse, or has a second motion of the plane where
 // the first has none (or the reverse): then the matches that were added contradict it.
-bool takes_guided_estimate(const tv_two_view& first, tv_verdict verdict_of_first,
-                           tv_verdict verdict_of_again, tv_two_view* again) {
-  if (again->has_R == 0 || again->has_t == 0 || again->kind != first.kind ||
-      again->has_alternative != first.has_alternative || verdict_of_again < verdict_of_first ||
-      again->num_inliers < first.num_inliers) {
-    return false;
-  }
-  again->agreement = first.agreement;
-  again->region_shift_rad = first.region_shift_rad;
-  again->num_places = first.num_places;
-  again->camera_chi2 = first.camera_chi2;
-  again->camera_turn_rad = first.camera_turn_rad;
-  again->camera_direction_rad = first.camera_direction_rad;
-  again->principal_point_chi2 = first.principal_point_chi2;
-  std::copy(first.principal_point_asked_px, first.principal_point_asked_px + 2,
-            again->principal_point_asked_px);
-  std::copy(first.principal_point_asked_covariance, first.principal_point_asked_covariance + 3,
-            again->principal_point_asked_covariance);
-  return true;
+bool takes_guided_estimate(const tv_two_view& first, const tv_two_view& again) {
+  return again.has_R != 0 && again.has_t != 0 && again.kind == first.kind &&
+         again.has_alternative == first.has_alternative && again.verdict >= first.verdict &&
+         again.num_inliers >= first.num_inliers;
 }
 
 }  // namespace tv

@@ -22,9 +22,8 @@ Judgement judge(const AbsoluteEvidence& evidence);
 double coverage_of(const Evidence& evidence);
 
 // Whether the geometry of the estimate with the matches of guided matching replaces that of the
-// first one. The verdicts are those of the two by themselves. Where it does, *again is given the
-// first one's measures of evidence, which the first one's judgement is from and which stay.
-bool takes_guided_estimate(const tv_two_view& first, tv_verdict verdict_of_first,
-                           tv_verdict verdict_of_again, tv_two_view* again);
+// first one. Each has the verdict that it has by itself; that of the first one, and the measures
+// that it is from, stay.
+bool takes_guided_estimate(const tv_two_view& first, const tv_two_view& again);
 
 }  // namespace tv

@@ -1,4 +1,4 @@
-#include "api/scratch.h"
+#include "pipeline/scratch.h"
 
 #include <algorithm>
 
@@ -7,25 +7,12 @@
 #include "match/guided.h"
 #include "match/match.h"
 #include "match/witness.h"
+#include "pipeline/pair_arrays.h"
 #include "pose/absolute_pose.h"
 #include "robust/bundle.h"
 #include "robust/two_view.h"
-#include "twoview/reconstruct.h"
 
 namespace tv {
-
-int32_t most_keypoints(const tv_limits& limits) {
-  int32_t most = limits.max_keypoints;
-  for (int32_t rung = 1; rung <= limits.max_effort; ++rung) {
-    most = std::max(most, rung_budget(rung, limits.max_keypoints));
-  }
-  return most;
-}
-
-int32_t most_chosen_matches(const tv_limits& limits) {
-  return std::min(most_keypoints(limits), std::max(limits.max_matches, limits.max_keypoints));
-}
-
 namespace {
 
 // Two arrays of keypoints: what was found, and its order while corners are found, or the oriented
@@ -34,18 +21,6 @@ size_t extract_scratch_bytes(const tv_limits& limits) {
   const size_t keypoints = arena_bytes<tv_keypoint>(static_cast<size_t>(limits.max_keypoints));
   return 2 * keypoints + std::max(corners_bytes(limits.max_width, limits.max_height),
                                   octaves_bytes(limits.max_width, limits.max_height));
-}
-
-// The results of tv_reconstruct.
-size_t reconstruct_result_bytes(const tv_limits& limits) {
-  const size_t n = static_cast<size_t>(most_keypoints(limits));
-  const size_t m = static_cast<size_t>(most_chosen_matches(limits));
-  const size_t tilts = limits.max_effort < 2 ? 0 : arena_bytes<uint8_t>(n);
-  return 2 * (arena_bytes<tv_keypoint>(n) + arena_bytes<uint8_t>(n * TV_DESCRIPTOR_BYTES) + tilts +
-              arena_bytes<double>(2 * m) + arena_bytes<float>(m)) +
-         2 * (arena_bytes<tv_correspondence>(n) + arena_bytes<uint8_t>(m)) +
-         arena_bytes<tv_point>(m) + arena_bytes<float>(m) + arena_bytes<tv_camera_pair>(1) +
-         arena_bytes<tv_two_view>(1);
 }
 
 // The bytes that extract_rung (pipeline/extract.h) takes.
@@ -97,7 +72,7 @@ size_t scratch_bytes(const tv_limits& limits) {
   for (unsigned bit = 0; bit < 7; ++bit) {
     if ((limits.purposes >> bit & 1) != 0) stage = std::max(stage, of_purpose[bit]);
   }
-  return stage + ((limits.purposes >> 3 & 1) != 0 ? reconstruct_result_bytes(limits) : 0);
+  return stage + ((limits.purposes >> 3 & 1) != 0 ? pair_arrays_bytes(limits) : 0);
 }
 
 }  // namespace tv
