@@ -27,8 +27,8 @@ LAYERS = {
                  "base"},
     "dense": {"triangulation", "geometry", "kernels", "base"},
     "room": {"geometry", "base"},
-    "pipeline": {"pose", "match", "robust", "feature", "image", "triangulation", "geometry",
-                 "kernels", "base"},
+    "pipeline": {"dense", "pose", "match", "robust", "feature", "image", "triangulation",
+                 "geometry", "kernels", "base"},
     "api": {"pipeline", "room", "dense", "odometry", "adjust", "pose", "match", "robust", "feature",
             "image", "triangulation", "geometry", "kernels", "base"},
 }

@@ -1,14 +1,13 @@
-// The entry points of the dense cloud: they validate, and call the stages of lib/src/dense.
-#include "twoview/dense.h"
+// The entry points of the dense cloud: they validate, and call pipeline/dense.h.
+#include "pipeline/dense.h"
 
-#include <algorithm>
-#include <cmath>
+#include <initializer_list>
 
 #include "api/camera_pair.h"
 #include "api/sized.h"
 #include "api/validate.h"
 #include "api/within.h"
-#include "dense/pair.h"
+#include "kernels/dense.h"
 
 namespace tv {
 namespace {
@@ -47,8 +46,6 @@ tv_status check_cameras(const tv_camera* camera0, const tv_camera* camera1) {
   return TV_OK;
 }
 
-DenseLimits limits_of(const tv_dense_options& o) { return {o.max_cells, o.max_steps}; }
-
 }  // namespace
 }  // namespace tv
 
@@ -62,8 +59,7 @@ tv_status tv_dense_size(const tv_camera* camera0, const tv_camera* camera1,
   tv_dense_options checked;
   tv_status status = tv::read_options(options, &checked);
   if (status == TV_OK) status = tv::check_cameras(camera0, camera1);
-  if (status == TV_OK)
-    *size_bytes = tv::match_pair_bytes(*camera0, *camera1, tv::limits_of(checked));
+  if (status == TV_OK) *size_bytes = tv::densify_bytes(*camera0, *camera1, checked);
   return status;
 }
 
@@ -85,8 +81,7 @@ tv_status tv_densify(void* memory, size_t size_bytes, const tv_camera_pair* pair
   if (status == TV_OK) status = tv::check_pair(*pair);
   if (status != TV_OK) return status;
   if (reinterpret_cast<uintptr_t>(memory) % TV_CONTEXT_ALIGNMENT != 0) return TV_ERR_ALIGNMENT;
-  const tv::DenseLimits limits = tv::limits_of(checked);
-  if (size_bytes < tv::match_pair_bytes(camera0, camera1, limits)) return TV_ERR_MEMORY;
+  if (size_bytes < tv::densify_bytes(camera0, camera1, checked)) return TV_ERR_MEMORY;
   const size_t num_sparse = static_cast<size_t>(checked.num_sparse);
   const tv::Bytes arrays[9] = {{points, static_cast<size_t>(cap_points) * sizeof(tv_dense_point)},
                                {num_points, sizeof *num_points},
@@ -100,54 +95,6 @@ tv_status tv_densify(void* memory, size_t size_bytes, const tv_camera_pair* pair
   if (tv::outputs_overlap(arrays, 3, 9)) return TV_ERR_OVERLAP;
 
   tv::Arena arena = tv::arena_over(memory, size_bytes);
-  tv::Mat3 rotation;
-  for (int i = 0; i < 9; ++i) rotation(i / 3, i % 3) = pair->cam1_from_cam0_R[i];
-  const double* const t = pair->cam1_from_cam0_t;
-  const tv::ParallaxHint hint{checked.min_parallax_rad, checked.max_parallax_rad, checked.sparse,
-                              checked.num_sparse};
-  tv::DensePair matched;
-  *num_points = 0;
-  if (!tv::match_pair(camera0, camera1, images[0], images[1], rotation, tv::Vec3(t[0], t[1], t[2]),
-                      hint, limits, arena, &matched)) {
-    return TV_OK;
-  }
-  const tv::DenseGrid& grid = matched.grid;
-  tv::PointMaker maker(matched, arena);
-  if (cap_points > checked.max_cells) cap_points = checked.max_cells;
-  // Where there is not room for all cells, those that have a point are counted first, and then as
-  // many as there is room for are written. A cell counts as much as it is wide in the image, which
-  // is less near an epipole.
-  const double most_sigma = checked.max_relative_sigma;
-  const auto weight_of = [&](int32_t x) {
-    return 1 + static_cast<int64_t>(maker.weight(x) * 1000);
-  };
-  int64_t total = 0, seen = 0;
-  int32_t count = 0, num = 0;
-  if (cap_points < grid.width * grid.height) {
-    for (int32_t y = 0; y < grid.height; ++y) {
-      for (int32_t x = 0; x < grid.width; ++x) {
-        if (!maker.is_precise(x, y, most_sigma)) continue;
-        total += weight_of(x);
-        ++count;
-      }
-    }
-  }
-  for (int32_t y = 0; y < grid.height; ++y) {
-    maker.go_to_row(y);
-    for (int32_t x = 0; x < grid.width; ++x) {
-      if (!maker.is_precise(x, y, most_sigma)) continue;
-      if (count > cap_points) {
-        seen += weight_of(x);
-        if (num >= cap_points || seen * cap_points < (num + 1) * total) continue;
-      }
-      tv_dense_point& point = points[num];
-      if (!maker.point(x, &point)) continue;
-      const int32_t u = static_cast<int32_t>(point.pixel0[0] + 0.5f);
-      const int32_t v = static_cast<int32_t>(point.pixel0[1] + 0.5f);
-      point.grey = images[0].data[static_cast<int64_t>(v) * images[0].stride_bytes + u];
-      ++num;
-    }
-  }
-  *num_points = num;
+  *num_points = tv::densify(*pair, images, checked, arena, points, cap_points);
   return TV_OK;
 }
