@@ -229,9 +229,23 @@ void test_a_lens_that_was_left_out_is_contradicted(void) {
   const CameraEvidence found = evidence(fly({0.9, lens, 0, 0, kFewPoints}), camera_with({kFocal}));
   TEST_ASSERT_TRUE(found.contradicts_lens());
   TEST_ASSERT_FALSE(found.contradicts_focal());
+  TEST_ASSERT_FALSE(found.contradicts_centre());
   // Four fifths of the way to a corner.
   const double d = 0.8 * std::hypot(kWidth, kHeight) / 2 / kFocal;
   TEST_ASSERT_DOUBLE_WITHIN(0.02, -0.3 * d * d + 0.05 * d * d * d * d, found.edge_change);
+}
+
+void test_a_principal_point_elsewhere_is_contradicted(void) {
+  for (const double shift : {-0.1, 0.1}) {
+    const double px = shift * kFocal;
+    const CameraEvidence found =
+        evidence(fly({0.9, {kFocal, 0, 0, 0, px, -px}, 0, 0, kFewPoints}), camera_with({kFocal}));
+    TEST_ASSERT_TRUE(found.contradicts_centre());
+    TEST_ASSERT_FALSE(found.contradicts_focal());
+    TEST_ASSERT_FALSE(found.contradicts_lens());
+    TEST_ASSERT_DOUBLE_WITHIN(3 * found.centre_sigma_px[0] + 2, px, found.centre_shift_px[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(3 * found.centre_sigma_px[1] + 2, -px, found.centre_shift_px[1]);
+  }
 }
 
 void test_pixels_that_are_not_square_are_the_cameras(void) {
@@ -294,6 +308,7 @@ int main(void) {
   RUN_TEST(test_the_right_camera_is_not_contradicted);
   RUN_TEST(test_a_wrong_focal_length_is_contradicted);
   RUN_TEST(test_a_lens_that_was_left_out_is_contradicted);
+  RUN_TEST(test_a_principal_point_elsewhere_is_contradicted);
   RUN_TEST(test_pixels_that_are_not_square_are_the_cameras);
   RUN_TEST(test_a_camera_that_goes_straight_contradicts_no_focal_length);
   RUN_TEST(test_few_keyframes_tell_nothing);

@@ -159,7 +159,8 @@ class Flights(unittest.TestCase):
                     report = file.read()
                 self.assertEqual(list(check),
                                  ["contradicted", "focal_change_percent", "focal_sigma_percent",
-                                  "edge_change_percent", "edge_sigma_percent"])
+                                  "edge_change_percent", "edge_sigma_percent",
+                                  "centre_shift_px", "centre_sigma_px"])
                 self.assertEqual(check["contradicted"], is_wrong)
                 self.assertLess(abs(check["focal_change_percent"] - 100 * (1 / factor - 1)),
                                 3 * np.hypot(check["focal_sigma_percent"], 1))

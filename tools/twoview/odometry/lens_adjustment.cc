@@ -275,10 +275,27 @@ double variance_by_cost(const Adjustment& best) {
   return 1 / (chi2 / (kAway * kAway) + 1 / kPriorVariance);
 }
 
-// Whether a change of the camera is more than chance, and more than calibrated cameras are off.
+// Whether a change of the camera, as a share, is more than chance, and more than calibrated cameras
+// are off.
 bool is_beyond(double sigmas, double change, double sigma) {
   constexpr double kOfCalibration = 0.01;
   return std::fabs(change) > sigmas * std::hypot(sigma, kOfCalibration);
+}
+
+bool is_focal_beyond(double sigmas, const CameraEvidence& e) {
+  return is_beyond(sigmas, e.focal_change, e.focal_sigma);
+}
+
+bool is_lens_beyond(double sigmas, const CameraEvidence& e) {
+  return is_beyond(sigmas, e.edge_change, e.edge_sigma);
+}
+
+// A shift of the principal point counts as the turn of the camera that it is taken for.
+bool is_centre_beyond(double sigmas, const CameraEvidence& e) {
+  const auto is_axis_beyond = [&](size_t k) {
+    return is_beyond(sigmas, e.centre_shift_px[k] / e.focal_px, e.centre_sigma_px[k] / e.focal_px);
+  };
+  return is_axis_beyond(0) || is_axis_beyond(1);
 }
 
 CameraEvidence evidence_of(std::vector<LensWindow> windows, const Picture& picture,
@@ -300,8 +317,15 @@ CameraEvidence evidence_of(std::vector<LensWindow> windows, const Picture& pictu
   bend(kK1) = sq;
   bend(kK2) = sq * sq;
   bend(kK3) = sq * sq * sq;
-  CameraEvidence evidence{true, std::expm1(change(kFocal)), std::sqrt(covariance(kFocal, kFocal)),
-                          bend.dot(change), std::sqrt(bend.dot(covariance * bend))};
+  const auto sigma_of = [&](int k) { return std::sqrt(covariance(k, k)); };
+  CameraEvidence evidence{true,
+                          std::expm1(change(kFocal)),
+                          sigma_of(kFocal),
+                          bend.dot(change),
+                          std::sqrt(bend.dot(covariance * bend)),
+                          {f * change(kCx), f * change(kCy)},
+                          {f * sigma_of(kCx), f * sigma_of(kCy)},
+                          f};
   if (is_thorough && evidence.contradicts_focal())
     evidence.focal_sigma = std::max(evidence.focal_sigma, std::sqrt(variance_by_cost(adjustment)));
   return evidence;
@@ -309,9 +333,11 @@ CameraEvidence evidence_of(std::vector<LensWindow> windows, const Picture& pictu
 
 }  // namespace
 
-bool CameraEvidence::contradicts_focal() const { return is_beyond(3, focal_change, focal_sigma); }
+bool CameraEvidence::contradicts_focal() const { return is_focal_beyond(3, *this); }
 
-bool CameraEvidence::contradicts_lens() const { return is_beyond(3, edge_change, edge_sigma); }
+bool CameraEvidence::contradicts_lens() const { return is_lens_beyond(3, *this); }
+
+bool CameraEvidence::contradicts_centre() const { return is_centre_beyond(3, *this); }
 
 std::vector<LensKeyframe> in_motion(const std::vector<FlightKeyframe>& keyframes,
                                     const Flight& flight) {
@@ -376,9 +402,8 @@ CameraEvidence evidence_on_camera(const std::vector<LensKeyframe>& keyframes,
   std::vector<LensWindow> windows = windows_of(keyframes, points, picture, kGlance);
   if (num_views(windows) < kLeastKeyframes) return {};
   const CameraEvidence first = evidence_of(std::move(windows), picture, false);
-  const bool is_suspect = is_beyond(2, first.focal_change, first.focal_sigma) ||
-                          is_beyond(2, first.edge_change, first.edge_sigma);
-  if (!is_suspect) return first;
+  if (!is_focal_beyond(2, first) && !is_lens_beyond(2, first) && !is_centre_beyond(2, first))
+    return first;
   return evidence_of(windows_of(keyframes, points, picture, kThorough), picture, true);
 }
 

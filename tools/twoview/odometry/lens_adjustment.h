@@ -3,6 +3,7 @@
 // docs/algorithms/focal_length.md.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "odometry/flight.h"
@@ -34,8 +35,8 @@ LensEstimate adjust_lens(const std::vector<LensKeyframe>& keyframes,
                          const std::vector<tv_map_point>& points, int width, int height,
                          const SimpleLens& start);
 
-// What a map says of the camera that it was made with: of its focal length, and of how its lens
-// bends the picture four fifths of the way from the middle to a corner.
+// What a map says of the camera that it was made with: of its focal length, of its principal point,
+// and of how its lens bends the picture four fifths of the way from the middle to a corner.
 struct CameraEvidence {
   bool is_known = false;    // false: the keyframes are too few
   double focal_change = 0;  // that of the camera that fits the map, over the given one, less 1
@@ -43,10 +44,17 @@ struct CameraEvidence {
   // By how much farther from the middle than by the given camera a ray meets the picture, over the
   // distance, and its standard deviation.
   double edge_change = 0, edge_sigma = 0;
+  // Of the principal point, x and y: where that of the camera that fits is, in pixels from the
+  // given one, and its standard deviations. Pixels that are not square show here, too.
+  std::array<double, 2> centre_shift_px{}, centre_sigma_px{};
+  double focal_px = 1;  // of the given camera
 
   bool contradicts_focal() const;
   bool contradicts_lens() const;
-  bool contradicts() const { return contradicts_focal() || contradicts_lens(); }
+  bool contradicts_centre() const;
+  bool contradicts() const {
+    return contradicts_focal() || contradicts_lens() || contradicts_centre();
+  }
 };
 
 // Adjusts the camera, of any model, as adjust_lens does: in six windows and with few points of
