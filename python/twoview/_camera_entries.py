@@ -11,7 +11,7 @@ import math
 import re
 from typing import Any, Callable, Iterator, Mapping, NamedTuple, Optional, Sequence
 
-from .camera import FARTHEST_CENTER, SHORTEST_FOCAL, Camera
+from .camera import FARTHEST_CENTER, SHORTEST_FOCAL, Camera, exchanged
 from .enums import CameraModel
 
 NUM_MODELLED = 8  # coefficients k1 k2 p1 p2 k3 k4 k5 k6 of a Camera
@@ -190,6 +190,9 @@ def checked_camera(width: int, height: int, K: Sequence[float], lens: CameraMode
         if not -FARTHEST_CENTER * side <= center <= (1 + FARTHEST_CENTER) * side:
             raise FormatError(f"{where}: c{axis} is {center:g}, far outside an image of {side} "
                               "pixels: is this principal point of another picture?")
+    question = exchanged((width, height), K)
+    if question:
+        raise FormatError(f"{where}: {question}")
     # An equidistant lens with four zero coefficients is no pinhole.
     if lens == CameraModel.BROWN_CONRADY and not any(k):
         lens = CameraModel.PINHOLE

@@ -15,6 +15,9 @@ from .enums import CameraModel
 
 SHORTEST_FOCAL = 0.02  # of the image's side: 176 degrees of a pinhole; below it is another unit
 FARTHEST_CENTER = 1.0  # image sides that the principal point may lie outside the image
+# tools/twoview/files/camera_doubts.cc has the same numbers.
+NEAR_MIDDLE, FAR_FROM_MIDDLE = 0.05, 0.08  # of a principal point, as shares of the image's side
+SAME_FOCAL, OTHER_FOCAL = 0.05, 0.1  # differences of fx and fy as shares
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -148,8 +151,38 @@ def _of_matrix(matrix: Any, size: Any) -> tuple[int, int, float, float, float, f
                              "another unit, as a normalised matrix is?")
         if not -FARTHEST_CENTER * side <= center <= (1 + FARTHEST_CENTER) * side:
             raise ValueError(f"K: c{axis} is {center:g}, far outside an image of {side} pixels")
+    question = exchanged(size, (K[0, 0], K[1, 1], K[0, 2], K[1, 2]))
+    if question:
+        raise ValueError(f"K: {question}")
     return (int(size[0]), int(size[1]), float(K[0, 0]), float(K[1, 1]), float(K[0, 2]),
             float(K[1, 2]))
+
+
+def exchanged(size: Sequence[int], K: Sequence[float]) -> str:
+    """The question whether fx fy cx cy are in another order, where they fit an image of this size
+    so and not as they are; else empty."""
+    def off_middle(x: float, y: float) -> list[float]:
+        return [abs((center + 0.5) / side - 0.5) for center, side in zip((x, y), size)]
+
+    def is_middle(x: float, y: float) -> bool:
+        return max(off_middle(x, y)) <= NEAR_MIDDLE
+
+    def is_same(a: float, b: float, share: float) -> bool:
+        return abs(a / b - 1) <= share
+
+    fx, fy, cx, cy = K
+    is_x_far, is_y_far = (off > FAR_FROM_MIDDLE for off in off_middle(cx, cy))
+    question = ""
+    if is_x_far and is_y_far and is_middle(cy, cx):
+        question = "are cx and cy exchanged, or is this camera of a turned picture?"
+    elif is_same(fx, fy, OTHER_FOCAL):
+        pass
+    elif (is_x_far or is_y_far) and is_middle(fx, fy) and cy and is_same(cx, cy, SAME_FOCAL):
+        question = "are fx and cx, fy and cy exchanged?"
+    elif is_x_far and is_middle(fy, cy) and cx and is_same(fx, cx, SAME_FOCAL):
+        question = "are fy and cx exchanged?"
+    return question and (f"fx {fx:g}, fy {fy:g}, cx {cx:g}, cy {cy:g} for an image of "
+                         f"{size[0]}x{size[1]}: {question}")
 
 
 def camera_struct(name: str, camera: Any) -> Any:

@@ -11,6 +11,7 @@
 #include <set>
 
 #include "base/error.h"
+#include "files/camera_doubts.h"
 #include "files/yaml_values.h"
 
 namespace cli {
@@ -732,6 +733,7 @@ void settle_camera(tv_camera& camera, const std::string& where) {
       throw BadInput(where + text);
     }
   }
+  refuse_exchanged(camera, where);
   if (camera.model == TV_CAMERA_BROWN_CONRADY &&
       std::all_of(std::begin(camera.k), std::end(camera.k), [](double k) { return k == 0; }))
     camera.model = TV_CAMERA_PINHOLE;

@@ -63,8 +63,9 @@ tv_camera take_camera(CameraEntries& entries, std::vector<std::string>& left_out
 // Whether a map describes a camera of its own: it has a camera matrix or a focal length.
 bool is_camera(const YAML::Node& map);
 
-// Throws BadInput for numbers that no camera has, and for those that are most often in another unit
-// or of another picture. A Brown-Conrady lens whose coefficients are all 0 becomes a pinhole.
+// Throws BadInput for numbers that no camera has, and for those that are most often in another
+// unit, of another picture or in another order. A Brown-Conrady lens whose coefficients are all 0
+// becomes a pinhole.
 void settle_camera(tv_camera& camera, const std::string& where);
 
 }  // namespace cli
