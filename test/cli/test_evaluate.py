@@ -98,6 +98,24 @@ class Evaluate(cli.CliTest):
         self.one_line(done, "2049x48 at 1600x37")
         self.assertEqual(json.loads(done.stdout)["options"]["resize"], 1600)
 
+    def test_a_K_of_pictures_of_another_size_is_refused(self):
+        for scale in (0.5, 0.75, 2):
+            other = [scale * value for value in K[:8]] + [1]
+            done = self.evaluate(pair_line(K0=other, K1=other))
+            size = f"{scale * (WIDTH - 1) + 1:.0f}x{scale * (HEIGHT - 1) + 1:.0f}"
+            self.assert_refused(done, "a.png", "about " + size, f"this one is {WIDTH}x{HEIGHT}",
+                                "--scale-camera")
+        self.write("set/cameras.yaml", "cam: {fx: %g, fy: %g, cx: %g, cy: %g, image_width: %d, "
+                   "image_height: %d}\n" % (FOCAL, FOCAL, K[2], K[5], WIDTH, HEIGHT))
+        done = self.evaluate(pair_line(K0=other, K1=other))
+        self.assert_refused(done, "a.png", f"fx {2 * FOCAL:g}", f"cameras.yaml has fx {FOCAL:g}")
+        self.succeed(self.evaluate(pair_line()))
+
+    def test_a_K_whose_centre_is_exchanged_is_refused(self):
+        other = [FOCAL, 0, K[5], 0, FOCAL, K[2], 0, 0, 1]
+        done = self.evaluate(pair_line(K1=other))
+        self.assert_refused(done, "b.png", "are cx and cy exchanged")
+
     def test_auc_is_superglues_and_failures_are_infinite(self):
         wrong = lambda deg: [
             math.cos(math.radians(deg)),

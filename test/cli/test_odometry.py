@@ -992,6 +992,12 @@ distortion_coefficients: [0, 0, 0, 0]
                             "(see twoview odometry --help)")
         for i in range(3):
             self.write(f"kitti/image_0/{i}.png", PICTURES[i])
+        self.write("kitti/times.txt", "0\n1\n2\n")
+        for fx, cx, cy, words in ((2 * FOCAL, WIDTH, HEIGHT, "scale them"),
+                                  (FOCAL, 4 * WIDTH, 0.7 * HEIGHT, "scale them"),
+                                  (FOCAL, HEIGHT / 2, WIDTH / 2, "cx and cy exchanged")):
+            self.write("kitti/calib.txt", f"P0: {fx} 0 {cx} 0 0 {fx} {cy} 0 0 0 1 0\n")
+            self.assert_refused(self.odometry("kitti"), "P0 of calib.txt", words)
         self.write("kitti/times.txt", "0\n1\n")
         self.assert_refused(self.odometry("kitti"), "2 times", "3 images")
 

@@ -430,7 +430,7 @@ void test_the_longest_name_that_begins_the_files_name_serves_it() {
 
 void test_an_images_camera_has_the_lines_K_and_the_entrys_lens_and_size() {
   const NamedCameras cameras = parse_camera_set(
-      "cam: {image_width: 8, image_height: 6, fx: 1, fy: 1, cx: 1, cy: 1, k1: 0.1}\n", "c");
+      "cam: {image_width: 8, image_height: 6, fx: 8.5, fy: 7, cx: 4, cy: 2.5, k1: 0.1}\n", "c");
   const std::array<double, 9> K = {9, 0, 4, 0, 7, 3, 0, 0, 1};
   const tv_camera camera = camera_of_image(cameras, "a.png", 8, 6, &K);
   TEST_ASSERT_EQUAL_DOUBLE(9, camera.fx);
@@ -438,7 +438,7 @@ void test_an_images_camera_has_the_lines_K_and_the_entrys_lens_and_size() {
   TEST_ASSERT_EQUAL_DOUBLE(4, camera.cx);
   TEST_ASSERT_EQUAL_DOUBLE(3, camera.cy);
   TEST_ASSERT_EQUAL_DOUBLE(0.1, camera.k[0]);
-  TEST_ASSERT_EQUAL_DOUBLE(1, camera_of_image(cameras, "a.png", 8, 6, nullptr).fx);
+  TEST_ASSERT_EQUAL_DOUBLE(8.5, camera_of_image(cameras, "a.png", 8, 6, nullptr).fx);
   const tv_camera pinhole = camera_of_image({}, "a.png", 8, 6, &K);
   TEST_ASSERT_EQUAL_INT(TV_CAMERA_PINHOLE, pinhole.model);
   TEST_ASSERT_EQUAL_INT(8, pinhole.width);
@@ -453,6 +453,9 @@ void test_an_images_camera_has_the_lines_K_and_the_entrys_lens_and_size() {
   const std::array<double, 9>* const none = nullptr;
   TEST_ASSERT_TRUE(is_refused(cameras, 9, &K));  // no camera has this image size
   TEST_ASSERT_TRUE(is_refused({}, 8, none));     // no camera and no K is given
+  const std::array<double, 9> K_of_half = {4.5, 0, 1.75, 0, 3.5, 1.25, 0, 0, 1};
+  TEST_ASSERT_TRUE(is_refused({}, 8, &K_of_half));
+  TEST_ASSERT_TRUE(is_refused(cameras, 8, &K_of_half));
 }
 
 // The number of pairs that a text holds, or minus the length of the message that refuses it.

@@ -42,11 +42,14 @@ from typing import Optional
 
 import numpy as np
 from twoview import camera_files
+from twoview.camera import exchanged
 
 from .rotations import made_rotation
 
 MAX_PAIRS_BYTES = 64 << 20
 FIELD_COUNTS = (2, 4, 22, 38)
+# tools/twoview/files/camera_doubts.cc has the reasons for these.
+OTHER_SCALE, SAME_SCALE, SAME_INTRINSICS = 1.15, 0.1, 0.1
 SAME_K = 1e-6  # relative; a larger difference means that K and a camera are not the same
 # A file that is refused. The message is one line that names the file and the error in it.
 FormatError = camera_files.FormatError
@@ -251,6 +254,34 @@ def choose_entry(cameras, image, K=None):
             raise FormatError(f"image {image}: its K fits the cameras {fits[0]} and {name}, which "
                               "differ")
     return fits[0] if fits else None
+
+
+def check_K(camera, image, K, width, height):
+    """Raises FormatError where K, of a pair's line, is not of an image of this size, as the
+    program's files/camera_doubts.cc does: of another order, of another size, or not those of the
+    entry `camera`, which may be None."""
+    fx, fy, cx, cy = K[0][0], K[1][1], K[0][2], K[1][2]
+    where, K = f"image {image}: K of the list's line", (fx, fy, cx, cy)
+    question = exchanged((width, height), K)
+    if question:
+        raise FormatError(f"{where}: {question}")
+    numbers = "fx %g, fy %g, cx %g, cy %g"
+    if camera is not None:
+        own = camera.fx, camera.fy, camera.cx, camera.cy
+        if not (all(abs(a / b - 1) <= SAME_INTRINSICS for a, b in zip(K[:2], own[:2]))
+                and abs(cx - camera.cx) <= SAME_INTRINSICS * camera.width
+                and abs(cy - camera.cy) <= SAME_INTRINSICS * camera.height):
+            raise FormatError(f"{where}: {numbers % K}, but cameras.yaml has {numbers % own} for "
+                              f"pictures of {camera.width}x{camera.height}: are they of pictures "
+                              "of another size? Correct one of the two")
+        return
+    x, y = 2 * (cx + 0.5) / width, 2 * (cy + 0.5) / height
+    is_larger, is_smaller = min(x, y) > OTHER_SCALE, 0 < min(x, y) and max(x, y) < 1 / OTHER_SCALE
+    if ((is_larger and max(x, y) > 2)
+            or ((is_larger or is_smaller) and abs(x / y - 1) <= SAME_SCALE)):
+        raise FormatError(f"{where}: {numbers % K} are of pictures of about {2 * cx + 1:.0f}x"
+                          f"{2 * cy + 1:.0f}, but this one is {width}x{height}: scale them, or "
+                          "give a camera file that has its size")
 
 
 def choose_camera(cameras, image, K=None):

@@ -1,5 +1,6 @@
 #include "files/camera_doubts.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
@@ -13,6 +14,9 @@ namespace {
 constexpr double kNearMiddle = 0.05, kFarFromMiddle = 0.08;
 // Differences of fx and fy, as shares: of one lens, and of two numbers that are not of one lens.
 constexpr double kSameFocal = 0.05, kOtherFocal = 0.1;
+// The factor between the sizes of two images that is above any principal point's doubt, and the
+// shares to which the factors of both axes are then the same, and two calibrations of one camera.
+constexpr double kOtherScale = 1.15, kSameScale = 0.1, kSameIntrinsics = 0.1;
 
 double share_off_middle(double center, int side) { return std::abs((center + 0.5) / side - 0.5); }
 
@@ -45,6 +49,42 @@ void refuse_exchanged(const tv_camera& camera, const std::string& where) {
   char text[240];
   std::snprintf(text, sizeof text, ": fx %g, fy %g, cx %g, cy %g for an image of %dx%d: %s",
                 camera.fx, camera.fy, camera.cx, camera.cy, camera.width, camera.height, question);
+  throw BadInput(where + text);
+}
+
+void refuse_other_scale(const tv_camera& camera, const std::string& where) {
+  const double x = 2 * (camera.cx + 0.5) / camera.width;
+  const double y = 2 * (camera.cy + 0.5) / camera.height;
+  const bool is_larger = std::min(x, y) > kOtherScale;
+  const bool is_smaller = std::min(x, y) > 0 && std::max(x, y) < 1 / kOtherScale;
+  // A principal point that is outside the image is of another one, whatever its shape.
+  const bool is_outside = std::max(x, y) > 2;
+  if (!(is_larger && is_outside) && !((is_larger || is_smaller) && difference(x, y) <= kSameScale))
+    return;
+  char text[320];
+  std::snprintf(text, sizeof text,
+                ": fx %g, cx %g, cy %g are of pictures of about %.0fx%.0f, but this one is %dx%d: "
+                "scale them, or give a camera file that has its size (--camera FILE, with "
+                "--scale-camera where the whole pictures were made smaller or larger)",
+                camera.fx, camera.cx, camera.cy, 2 * camera.cx + 1, 2 * camera.cy + 1, camera.width,
+                camera.height);
+  throw BadInput(where + text);
+}
+
+void refuse_other_intrinsics(const tv_camera& camera, const tv_camera& entry,
+                             const std::string& where) {
+  if (difference(camera.fx, entry.fx) <= kSameIntrinsics &&
+      difference(camera.fy, entry.fy) <= kSameIntrinsics &&
+      std::abs(camera.cx - entry.cx) <= kSameIntrinsics * entry.width &&
+      std::abs(camera.cy - entry.cy) <= kSameIntrinsics * entry.height)
+    return;
+  char text[320];
+  std::snprintf(text, sizeof text,
+                ": fx %g, fy %g, cx %g, cy %g, but cameras.yaml has fx %g, fy %g, cx %g, cy %g for "
+                "pictures of this size, %dx%d: are they of pictures of another size? Correct one "
+                "of the two",
+                camera.fx, camera.fy, camera.cx, camera.cy, entry.fx, entry.fy, entry.cx, entry.cy,
+                entry.width, entry.height);
   throw BadInput(where + text);
 }
 

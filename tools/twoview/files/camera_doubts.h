@@ -1,4 +1,4 @@
-// Intrinsics that are those of the image only in another order.
+// Intrinsics that are those of the image only in another order, or of an image of another size.
 #pragma once
 
 #include <string>
@@ -11,5 +11,14 @@ namespace cli {
 // order and not as they are: cx and cy exchanged, or a focal length with a centre. `where` is what
 // the message begins with. python/twoview/camera.py has the same rule.
 void refuse_exchanged(const tv_camera& camera, const std::string& where);
+
+// For intrinsics that came without an image size, in a camera that has that of the image: throws
+// BadInput where the principal point is that of an image that is larger or smaller on both axes.
+void refuse_other_scale(const tv_camera& camera, const std::string& where);
+
+// Throws BadInput where intrinsics for an image, as those on the line of a list of pairs, are not
+// those of the camera file's entry for images of the same size.
+void refuse_other_intrinsics(const tv_camera& camera, const tv_camera& entry,
+                             const std::string& where);
 
 }  // namespace cli

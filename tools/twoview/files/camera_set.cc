@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "base/output.h"
+#include "files/camera_doubts.h"
 #include "files/camera_entries.h"
 #include "files/yaml_values.h"
 
@@ -93,12 +94,18 @@ tv_camera camera_of_image(const NamedCameras& cameras, const std::string& image_
   }
   camera.width = width;
   camera.height = height;
-  if (K) {
-    camera.fx = (*K)[0];
-    camera.cx = (*K)[2];
-    camera.fy = (*K)[4];
-    camera.cy = (*K)[5];
-  }
+  if (!K) return camera;
+  const tv_camera entry = camera;
+  const std::string where = "image " + image_name + ": K of the list's line";
+  camera.fx = (*K)[0];
+  camera.cx = (*K)[2];
+  camera.fy = (*K)[4];
+  camera.cy = (*K)[5];
+  refuse_exchanged(camera, where);
+  if (cameras.empty())
+    refuse_other_scale(camera, where);
+  else
+    refuse_other_intrinsics(camera, entry, where);
   return camera;
 }
 

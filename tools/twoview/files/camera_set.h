@@ -29,8 +29,8 @@ const tv_camera* choose_camera(const NamedCameras& cameras, const std::string& i
 
 // The camera of an image of a set, for the pixels that its file holds: the chosen entry's lens with
 // the intrinsics of K where the pair's line gives them. `cameras` may be empty, then K makes a
-// pinhole. Throws BadInput when no entry fits, when the entry is for another size, and when there
-// is neither an entry nor K.
+// pinhole. Throws BadInput when no entry fits, when the entry is for another size, when there is
+// neither an entry nor K, and when K is not of this picture (files/camera_doubts.h).
 tv_camera camera_of_image(const NamedCameras& cameras, const std::string& image_name, int width,
                           int height, const std::array<double, 9>* K);
 

@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "base/matrix.h"
 #include "base/output.h"
+#include "files/camera_doubts.h"
 #include "files/camera_file.h"
 #include "files/camera_formats.h"
 #include "files/camera_set.h"
@@ -295,16 +296,20 @@ void read_kitti(Folder& folder) {
   add_kitti_camera(folder);
 }
 
-// KITTI's calib.txt gives no image size: the camera takes that of the images.
+// KITTI's calib.txt gives no image size: the camera takes that of the images, which its principal
+// point must fit.
 class KittiFolder : public ImageFolder {
  public:
   explicit KittiFolder(Folder folder)
       : ImageFolder(Folder(folder)), cameras_(std::move(folder.cameras)) {}
-  std::optional<tv_camera> camera(const SourceFrame&, int width, int height) const override {
+  std::optional<tv_camera> camera(const SourceFrame& frame, int width, int height) const override {
     if (cameras_.empty()) return {};
     tv_camera camera = cameras_[0].second;
     camera.width = width;
     camera.height = height;
+    const std::string where = "image " + frame.name + ": P0 of calib.txt";
+    refuse_exchanged(camera, where);
+    refuse_other_scale(camera, where);
     return camera;
   }
 

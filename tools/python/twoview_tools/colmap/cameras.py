@@ -85,6 +85,8 @@ class CameraChoice:
                     f"file or "
                     "the images)"
                 )
+            with refused(name):
+                formats.check_K(None, name, K, width, height)
             return tv.Camera(width, height, K[0, 0], K[1, 1], K[0, 2], K[1, 2])
         if (camera.width, camera.height) != (width, height):
             raise BadInput(
@@ -93,4 +95,6 @@ class CameraChoice:
             )
         if K is None:
             return camera
+        with refused(name):
+            formats.check_K(camera, name, K, width, height)
         return tv.Camera(width, height, K[0, 0], K[1, 1], K[0, 2], K[1, 2], camera.model, camera.k)

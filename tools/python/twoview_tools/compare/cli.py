@@ -158,11 +158,14 @@ def make_task(arguments, name, folder, pair, cameras):
     views, masks = [], Masks(arguments.mask)
     for image, K in ((pair.name0, pair.K0), (pair.name1, pair.K1)):
         try:
-            distortion = datasets.distortion_of(formats.choose_camera(cameras, image, K))
+            camera = formats.choose_camera(cameras, image, K)
+            if camera is not None:
+                formats.check_K(camera, image, K, camera.width, camera.height)
+            distortion = datasets.distortion_of(camera)
         except ValueError as error:
             raise BadInput(f"{name}: {error}") from error
         views.append({"name": image, "path": os.path.abspath(os.path.join(folder, image)),
-                      "K": K.tolist(), "distortion": distortion,
+                      "K": K.tolist(), "distortion": distortion, "has_entry": camera is not None,
                       "mask": arguments.mask and os.path.abspath(masks.file_of(image))})
     truth = None if pair.R is None else {"R": pair.R.tolist(), "t": pair.t.tolist()}
     return {"what": "pair", "set": name, "views": views, "truth": truth,

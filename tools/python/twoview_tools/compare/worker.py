@@ -20,6 +20,7 @@ from multiprocessing.connection import Connection
 
 import numpy as np
 
+from .. import formats
 from ..accuracy import datasets, estimators
 from . import systems
 from .masked import kept_by_mask, used_pixels
@@ -63,6 +64,8 @@ class Views:
             self.used.append(used_pixels(view["mask"], image.shape))
             self.file_sizes.append((round(image.shape[1] / scale_x),
                                     round(image.shape[0] / scale_y)))
+            if not view["has_entry"]:
+                formats.check_K(None, view["name"], view["K"], *self.file_sizes[-1])
             K = datasets.scale_K(np.array(view["K"]), scale_x, scale_y)
             self.cameras.append((K, view["distortion"]))
         self.sizes = [image.shape[::-1] for image in self.gray]
