@@ -550,6 +550,31 @@ void test_plain_walls_are_found_by_their_edges_and_inferred_between() {
   for (const tv_room_vertex& v : vertices) TEST_ASSERT_EQUAL(0, v.inferred);
 }
 
+// Two noisy walls side by side, one 6 cm behind the other. More of the surface lies near an oblique
+// plane through both than near either wall.
+void test_walls_that_are_nearly_in_line_are_planes_of_their_own() {
+  const double kNear = 2.007, kFar = 2.067;
+  tv::Random random = tv::random_seeded(5);
+  tv_room* room = new_room();
+  for (int k = 0; k < 2; ++k) {
+    Map m = wall_at(kNear, Vec3(0, 0, 0), 0.02f);
+    for (size_t i = 0; i < m.distance.size(); ++i) {
+      const size_t x = i % 160;
+      const double to_wall = x < 70 ? 1 : x < 90 ? 0 : kFar / kNear;
+      m.distance[i] *= static_cast<float>(to_wall * (1 + scene::uniform(&random, -0.01, 0.01)));
+    }
+    TEST_ASSERT_EQUAL(TV_OK, add(room, m));
+  }
+  const Planes planes = find_planes(room, false);
+  TEST_ASSERT_EQUAL(2, planes.num);
+  for (int k = 0; k < 2; ++k) {
+    const tv_room_plane& p = planes.planes[k];
+    TEST_ASSERT_TRUE(p.normal[1] < -0.9999);  // within 0.8 degrees
+    TEST_ASSERT_DOUBLE_WITHIN(0.005, p.centre[0] < 0 ? kNear : kFar, p.centre[1]);
+  }
+  TEST_ASSERT_TRUE(planes.planes[0].centre[0] * planes.planes[1].centre[0] < 0);
+}
+
 // A wall that was measured with waves of 2 cm, at their sigma, and a box before it.
 void test_surface_on_a_plane_is_drawn_to_it_and_other_surface_stays() {
   const double kWall = 2.007, kBox = 1.6;
@@ -748,6 +773,7 @@ int main(void) {
   RUN_TEST(test_distances_that_are_none_are_unknown);
   RUN_TEST(test_small_pieces_are_left_out);
   RUN_TEST(test_plain_walls_are_found_by_their_edges_and_inferred_between);
+  RUN_TEST(test_walls_that_are_nearly_in_line_are_planes_of_their_own);
   RUN_TEST(test_surface_on_a_plane_is_drawn_to_it_and_other_surface_stays);
   RUN_TEST(test_surface_of_a_large_sigma_is_left_out_when_wanted);
   RUN_TEST(test_a_plane_is_not_carried_where_farther_things_were_measured);

@@ -23,7 +23,9 @@ constexpr double kPatch = 9;
 // A plane is upright or level where it is so to within 10 degrees.
 constexpr double kUprightSine = 0.174, kLevelCosine = 0.985;
 
-constexpr int32_t kOfNone = -1, kIgnored = -2;
+// What blocks are of, beside planes. While a plane is fitted, those that belong to it are of its
+// largest part or of its others.
+constexpr int32_t kOfNone = -1, kIgnored = -2, kOfLargest = -3, kOfOthers = -4;
 
 struct Plane {
   double normal[3], offset;
@@ -89,6 +91,50 @@ bool best_candidate(const tv_room& room, double min_area, Plane* best) {
   return found;
 }
 
+// Relabels, from `of` to `as`, the part of the plane's blocks that holds the block `first`, each of
+// which touches another one. Returns its area.
+double label_part(tv_room& room, const Plane& plane, int32_t first, int32_t of, int32_t as) {
+  double area = 0;
+  int32_t num = 0;
+  const auto take = [&](int32_t index) {
+    room.surfels[index].plane = as;
+    area += static_cast<double>(room.surfels[index].area);
+    room.near[num++] = index;
+  };
+  take(first);
+  for (int32_t k = 0; k < num; ++k) {
+    const BlockPlace place = place_of(room.blocks[room.near[k]].key);
+    for (int32_t n = 0; n < 27; ++n) {
+      const BlockPlace beside = {place.x + n % 3 - 1, place.y + n / 3 % 3 - 1, place.z + n / 9 - 1,
+                                 false};
+      const int32_t index = find_block(room, block_key(room, beside));
+      if (index < 0 || room.surfels[index].plane != of) continue;
+      if (belongs(plane, room.surfels[index], room.options.voxel)) take(index);
+    }
+  }
+  return area;
+}
+
+// Labels the blocks that belong to the plane: kOfLargest in the connected part of the largest area.
+void label_parts(tv_room& room, const Plane& plane) {
+  double most = -1;
+  int32_t largest = 0;
+  for (int32_t k = 0; k < room.end_blocks; ++k) {
+    const Surfel& s = room.surfels[k];
+    if (s.plane != kOfNone || !belongs(plane, s, room.options.voxel)) continue;
+    const double area = label_part(room, plane, k, kOfNone, kOfOthers);
+    if (area > most) most = area, largest = k;
+  }
+  if (most > 0) label_part(room, plane, largest, kOfOthers, kOfLargest);
+}
+
+void unlabel_parts(tv_room& room) {
+  for (int32_t k = 0; k < room.end_blocks; ++k) {
+    int32_t& of = room.surfels[k].plane;
+    if (of == kOfLargest || of == kOfOthers) of = kOfNone;
+  }
+}
+
 // Solves the symmetric positive definite 3 x 3 system A x = b by elimination; A and b are changed.
 void solve3(double A[3][3], double b[3], double x[3]) {
   for (int k = 0; k < 3; ++k) {
@@ -127,16 +173,16 @@ void axes_of(const PlaneRequest& request, const double normal[3], double u[3], d
   cross(normal, u, v);
 }
 
-// Moves the plane to the least squares of the blocks that belong to it. Where gravity is known and
-// the plane is nearly upright or level, its slope against gravity is drawn to 0 by the sigma with
-// which gravity is known.
-Fit refit(const tv_room& room, const PlaneRequest& request, Plane* plane) {
+// Moves the plane to the least squares of the blocks of a label that belong to it. Where gravity is
+// known and the plane is nearly upright or level, its slope against gravity is drawn to 0 by the
+// sigma with which gravity is known.
+Fit refit(const tv_room& room, const PlaneRequest& request, int32_t label, Plane* plane) {
   const double voxel = room.options.voxel;
   const double unit = (kBlockSide * voxel) * (kBlockSide * voxel);  // the area of a block's side
   Fit fit = {0, 0, 0, {0, 0, 0}};
   for (int32_t k = 0; k < room.end_blocks; ++k) {
     const Surfel& s = room.surfels[k];
-    if (s.plane != kOfNone || !belongs(*plane, s, voxel)) continue;
+    if (s.plane != label || !belongs(*plane, s, voxel)) continue;
     const double weight = weight_of(s, voxel);
     for (int i = 0; i < 3; ++i) fit.centre[i] += weight * static_cast<double>(s.mean[i]);
     fit.weight += weight;
@@ -148,7 +194,7 @@ Fit refit(const tv_room& room, const PlaneRequest& request, Plane* plane) {
   double A[3][3] = {}, b[3] = {};
   for (int32_t k = 0; k < room.end_blocks; ++k) {
     const Surfel& s = room.surfels[k];
-    if (s.plane != kOfNone || !belongs(*plane, s, voxel)) continue;
+    if (s.plane != label || !belongs(*plane, s, voxel)) continue;
     double from[3];
     for (int i = 0; i < 3; ++i) from[i] = static_cast<double>(s.mean[i]) - fit.centre[i];
     const double row[3] = {dot(u, from), dot(v, from), 1};
@@ -221,8 +267,13 @@ int32_t find_planes(tv_room& room, const PlaneRequest& request, tv_room_plane* p
   int32_t num = 0;
   Plane plane;
   while (num < cap && best_candidate(room, request.min_area, &plane)) {
+    // One plane near several surfaces fits none of them: it is fitted to the largest, and then to
+    // what else lies on it.
+    label_parts(room, plane);
+    for (int k = 0; k < kRefits; ++k) refit(room, request, kOfLargest, &plane);
+    unlabel_parts(room);
     Fit fit = {0, 0, 0, {0, 0, 0}};
-    for (int k = 0; k < kRefits; ++k) fit = refit(room, request, &plane);
+    for (int k = 0; k < kRefits; ++k) fit = refit(room, request, kOfNone, &plane);
     const double area = area_near(room, plane, 1);
     bool any = false;
     for (int32_t k = 0; k < room.end_blocks; ++k) {
