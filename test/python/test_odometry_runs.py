@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 
 from twoview_tools import formats
-from twoview_tools.accuracy import datasets
+from twoview_tools.accuracy import datasets, fusion
 from twoview_tools.odometry import (cli, copies, endurance, evaluate, faults, flights, mapper,
                                     poses, runs, sensors, set_writer, sets, surfaces, targets)
 
@@ -179,6 +179,17 @@ class Flights(unittest.TestCase):
         self.assertLess(abs(focal["pixels"] / np.sqrt(camera.fx * camera.fy) - 1), 0.05)
         written = formats.read_camera(out + "/estimated_camera.yaml")
         self.assertAlmostEqual(written.fx, focal["pixels"], delta=1e-6)
+
+    def test_the_fusion_example_is_as_exact_as_it_says(self):
+        out = io.StringIO()
+        with contextlib.redirect_stdout(out):
+            fusion.main([self.turning(), "--noise", "0.1", "--draws", "3"])
+        values = [float(value) for value in re.search(r"(?m)^all .*", out.getvalue())[0].split()
+                  if value not in ("all", "%")]
+        _, alone, _, _, _, fused, _, _, nees, share = values
+        self.assertLess(fused, alone)
+        self.assertLess(nees, 3)
+        self.assertGreater(share, 30)
 
     def test_changed_copies_see_the_same_points(self):
         def pixels(found, k, world):
