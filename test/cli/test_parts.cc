@@ -21,10 +21,11 @@
 #include "odometry/flight.h"
 #include "odometry/outputs.h"
 #include "odometry/reach.h"
-#include "odometry/truth_fit.h"
+#include "odometry/truth_doubts.h"
 #include "pair/camera_advice.h"
 #include "pair/measures.h"
 #include "pair/options.h"
+#include "pair/pose_readings.h"
 #include "pair/result.h"
 #include "pictures/canvas.h"
 #include "report/report.h"
@@ -841,6 +842,53 @@ FrameClock clock_of_60(const char* pattern) {
   return clock;
 }
 
+void test_a_true_pose_with_other_conventions_is_named() {
+  const Matrix3 R = rotation_of_quaternion(0.1, 0.2, -0.05, 0.97);
+  const Vector3 t = {-0.5, 0.3, 0.4};
+  TEST_ASSERT_TRUE(reading_words(R, t, R, t).empty());
+  // Each reading is its own inverse: what is written so is named so.
+  for (const PairReading& written : other_readings(R, t)) {
+    const bool is_place = holds(written.words, "the place of camera 1");
+    const Vector3 place = applied(transposed(R), {-t[0], -t[1], -t[2]});
+    const std::string words = reading_words(R, t, written.R, is_place ? place : written.t);
+    TEST_ASSERT_TRUE_MESSAGE(holds(words, written.words), words.c_str());
+  }
+  TEST_ASSERT_TRUE(reading_words(R, t, R, {0.5, 0.3, -0.2}).empty());  // of another pair
+}
+
+// What is doubted of a truth that is the flight with this change.
+template <typename Change>
+std::string doubts_of(const Change& change) {
+  TruePoses truth;
+  truth.poses = turning_flight();
+  for (size_t i = 0; i < truth.poses.size(); ++i) change(i, truth.poses[i]);
+  std::string words;
+  for (const std::string& doubt : truth_doubts(turning_flight(), truth, clock_of_60("%d.png")))
+    words += doubt + "\n";
+  return words;
+}
+
+void test_a_truth_of_another_clock_or_in_degrees_is_named() {
+  const auto none = doubts_of([](size_t, TimedPose&) {});
+  TEST_ASSERT_TRUE_MESSAGE(none.empty(), none.c_str());
+  for (const int frames : {1, 3, 15}) {
+    const std::string later = doubts_of([&](size_t, TimedPose& at) { at.time_s += frames / 15.0; });
+    const std::string count = "(" + std::to_string(frames) + " frame";
+    TEST_ASSERT_TRUE_MESSAGE(holds(later, count.c_str()) && holds(later, "smaller"), later.c_str());
+  }
+  const std::string earlier = doubts_of([](size_t, TimedPose& at) { at.time_s -= 4 / 15.0; });
+  TEST_ASSERT_TRUE(holds(earlier, "0.267 s (4 frames) larger"));
+  const std::string rate = doubts_of([](size_t, TimedPose& at) { at.time_s *= 2; });
+  TEST_ASSERT_TRUE_MESSAGE(holds(rate, "one by one (--fps?)"), rate.c_str());
+  // A metre at 47 degrees north; and the same numbers as metres of a path that is far away.
+  const auto in_degrees = [](size_t, TimedPose& at) {
+    at.pose.t = {47 + at.pose.t[1] / 111320, 8 + at.pose.t[0] / 75920, 400 + at.pose.t[2]};
+  };
+  TEST_ASSERT_TRUE(holds(doubts_of(in_degrees), "latitude and longitude in degrees"));
+  const std::string far = doubts_of([](size_t, TimedPose& at) { at.pose.t[0] += 47; });
+  TEST_ASSERT_TRUE_MESSAGE(far.empty(), far.c_str());
+}
+
 // What is said of a truth whose times are first, first + step, ..., and how many then meet.
 std::string words_on_numbers(double first, double step, const char* pattern, int* num_met) {
   TruePoses truth;
@@ -912,6 +960,8 @@ int main() {
   RUN_TEST(test_a_clock_that_falls_and_rises_again_began_anew);
   RUN_TEST(test_a_truth_with_the_other_order_of_its_quaternions_is_told_from_the_right_one);
   RUN_TEST(test_times_that_are_frame_numbers_are_understood_and_said);
+  RUN_TEST(test_a_true_pose_with_other_conventions_is_named);
+  RUN_TEST(test_a_truth_of_another_clock_or_in_degrees_is_named);
   RUN_TEST(test_auc_is_the_area_under_straight_lines_of_recall);
   RUN_TEST(test_percentile_lies_between_its_neighbours);
   RUN_TEST(test_a_distance_has_the_sigma_that_the_pose_gives_it);

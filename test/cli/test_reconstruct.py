@@ -226,6 +226,7 @@ class Reconstruct(cli.CliTest):
         errors = self.result()["truth"]
         self.assertLess(errors["translation_error_deg"], 0.5)
         self.assertGreater(errors["translation_error_signed_deg"], 179)
+        self.assertIn("if it is cam0_from_cam1, the other direction", self.result()["notes"][0])
 
     def test_the_cloud_has_the_depths_and_the_colours_of_image_0(self):
         left, right = cli.stereo_pair()

@@ -65,6 +65,24 @@ class Truths(CliTest):
         self.assertIn("the truth's times were taken as the numbers in the pictures' names",
                       result["notes"][0])
 
+    def test_zeros_of_a_motion_capture_are_left_out(self):
+        far = lines(lambda t, x: f"{t:.6f} {1 + x} 0 0 0 0 0 1").splitlines(True)
+        for i in (7, 8, 12):
+            far[i] = far[i].split()[0] + " 0 0 0 0 0 0 1\n"
+        result = self.compare("".join(far))
+        self.assertIn(f"3 of {COUNT} poses are exactly 0", result["notes"][0])
+        self.assertEqual(result["truth"]["num_compared"], COUNT - 3)
+        self.assertLess(result["truth"]["ate_rmse_percent_of_path"], 1)
+        # A path that begins at the origin keeps its pose.
+        result = self.compare(lines(lambda t, x: f"{t:.6f} {x} 0 0 0 0 0 1"))
+        self.assertEqual((result["notes"], result["truth"]["num_compared"]), ([], COUNT))
+
+    def test_poses_without_times_that_are_not_as_many_as_the_frames_are_named(self):
+        poses = lines(lambda t, x: f"1 0 0 {x} 0 1 0 0 0 0 1 0").splitlines(True)
+        for text, count in ((poses[2:], COUNT - 2), (poses + poses[-1:], COUNT + 1)):
+            self.assertIn(f"the truth has {count} poses without times, but there are {COUNT} "
+                          "frames", self.compare("".join(text))["notes"][0])
+
     def test_a_truth_that_stays_in_one_place_loses_no_result(self):
         done = self.run_with(lines(lambda t, x: f"{t:.6f} 1 2 3 0 0 0 1"))
         self.succeed(done)

@@ -295,7 +295,7 @@ FlightRoom room_of(Arguments& a, FrameSource& source, FlightResult& result,
   }
   if (true_room.is_given()) {
     const auto surface = [&] {
-      return true_room.surface(room.scene, {false, result.truth, result.truth_note});
+      return true_room.surface(room.scene, {false, result.truth, result.truth_note, {}});
     };
     add_truth(surface, room.scene, *room.model, !a.common.quiet, a.common);
   }
@@ -590,8 +590,7 @@ int odometry(Arguments& a) {
   const std::optional<FilmFacts> film = source->film();
   FlightResult result = result_of(flight, truth, film ? film->clock_start_s : 0,
                                   wanted < 0 ? static_cast<int>(flight.frames().size()) : wanted);
-  for (const std::string& note : {result.truth_note, result.rotation_note})
-    if (!note.empty()) common.note(note);
+  for (const std::string& note : result.truth_notes) common.note(note);
   if (!flight.still_mask().empty()) common.note(still_note(result));
   bool was_stopped = stop;
 #ifdef TWOVIEW_HAS_ROOM

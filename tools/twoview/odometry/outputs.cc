@@ -6,7 +6,7 @@
 #include <map>
 #include <set>
 
-#include "odometry/truth_fit.h"
+#include "odometry/truth_doubts.h"
 #include "report/ply.h"
 
 namespace cli {
@@ -246,8 +246,13 @@ FlightResult result_of(const Flight& flight, const std::optional<TruePoses>& tru
     result.has_truth = true;
     TruePoses fitted = *truth;
     const Trajectory path = trajectory_of(flight, result.segment);
-    result.truth_note = fit_times(path, fitted, clock_of(flight, film_start_s));
-    result.rotation_note = rotation_words(path, fitted);
+    const FrameClock clock = clock_of(flight, film_start_s);
+    result.truth_notes = truth->notes;
+    result.truth_note = fit_times(path, fitted, clock);
+    for (const std::string& note : {result.truth_note, rotation_words(path, fitted)})
+      if (!note.empty()) result.truth_notes.push_back(note);
+    for (const std::string& doubt : truth_doubts(path, fitted, clock))
+      result.truth_notes.push_back(doubt);
     result.truth = fitted.poses;
     result.accuracy = accuracy_of(path, result.truth);
     result.live_accuracy =

@@ -33,8 +33,9 @@ struct FlightResult {
   LiveStretch live_stretch;
   bool has_truth = false;
   Trajectory truth;
-  // Notes on the times and on the rotations of the truth; empty where nothing was odd.
-  std::string truth_note, rotation_note;
+  // A note on the times of the truth, empty where nothing was odd, and all notes on it.
+  std::string truth_note;
+  std::vector<std::string> truth_notes;
   Accuracy accuracy, live_accuracy;  // of the segment, and of that stretch
   nlohmann::ordered_json json;
 };

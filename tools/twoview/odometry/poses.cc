@@ -21,6 +21,46 @@ constexpr double kUnitError = 0.1;  // by how much a quaternion's length may dif
   throw BadInput(file + ": line " + std::to_string(line) + " " + why);
 }
 
+// Whether a pose is exactly that of the origin.
+bool is_origin(const Pose& pose) {
+  return pose.t == Vector3{0, 0, 0} && pose.R == Matrix3{1, 0, 0, 0, 1, 0, 0, 0, 1};
+}
+
+// Leaves out the poses that are marked, where the step to them is no step of the path: a motion
+// capture writes zeros where it sees no body. A path that begins at the origin keeps its pose.
+void leave_out_zeros(const std::vector<bool>& is_zero, TruePoses& truth) {
+  constexpr double kFar = 10;  // median steps of the path
+  Trajectory& poses = truth.poses;
+  std::vector<double> steps;
+  double nearest = HUGE_VAL;  // of the steps to a pose that is zero
+  for (size_t i = 1; i < poses.size(); ++i) {
+    if (is_zero[i] && is_zero[i - 1]) continue;
+    const double step = norm(minus(poses[i].pose.t, poses[i - 1].pose.t));
+    if (is_zero[i] || is_zero[i - 1])
+      nearest = std::min(nearest, step);
+    else
+      steps.push_back(step);
+  }
+  if (steps.empty() || nearest == HUGE_VAL) return;
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  if (!(*middle > 0 && nearest > kFar * *middle)) return;
+  Trajectory kept;
+  for (size_t i = 0; i < poses.size(); ++i)
+    if (!is_zero[i]) kept.push_back(poses[i]);
+  truth.notes.push_back("the truth: " + std::to_string(poses.size() - kept.size()) + " of " +
+                        std::to_string(poses.size()) +
+                        " poses are exactly 0 among others that are far from it, as a motion "
+                        "capture writes them where it sees nothing, and were left out");
+  poses = std::move(kept);
+}
+
+std::string count_words(size_t num_poses, size_t num_frames) {
+  return "the truth has " + std::to_string(num_poses) + " poses without times, but there are " +
+         std::to_string(num_frames) +
+         " frames: pose k was taken as that of frame k, from the first on";
+}
+
 Pose pose_of_12(const double* m) {
   return {{m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]}, {m[3], m[7], m[11]}};
 }
@@ -266,6 +306,9 @@ TruePoses load_trajectory(const std::string& file, const std::vector<double>& fr
   if (lines.empty()) throw BadInput(file + ": no pose in it");
   if (layout.is_matrix && frame_times.empty())
     throw BadInput(file + " has KITTI's poses without times, and the frames' times are not known");
+  if (layout.is_matrix && lines.size() != frame_times.size())
+    truth.notes.push_back(count_words(lines.size(), frame_times.size()));
+  std::vector<bool> is_zero;
   for (const TextLine& line : lines) {
     const std::vector<double> n = numbers_in(file, line);
     if (n.size() != layout.count)
@@ -277,6 +320,7 @@ TruePoses load_trajectory(const std::string& file, const std::vector<double>& fr
       const size_t idx = truth.poses.size();
       if (idx >= frame_times.size()) break;  // the poses of frames beyond those that are here
       at = {frame_times[idx], pose_of_12(n.data())};
+      is_zero.push_back(is_origin(at.pose));
       at.pose.R = made_rotation(at.pose.R, file + ": line " + std::to_string(line.number));
     } else {
       const auto value = [&](size_t column) { return n[layout.at[column]]; };
@@ -285,6 +329,7 @@ TruePoses load_trajectory(const std::string& file, const std::vector<double>& fr
       at.time_s = value(0) * layout.unit_s;
       at.pose.t = {value(1), value(2), value(3)};
       at.pose.R = rotation_of_quaternion(value(4), value(5), value(6), value(7));
+      is_zero.push_back(is_origin(at.pose));
       if (layout.is_body && body_from_camera)
         at.pose = composed(at.pose, pose_of_12(body_from_camera->data()));
     }
@@ -292,6 +337,7 @@ TruePoses load_trajectory(const std::string& file, const std::vector<double>& fr
       refuse_line(file, line.number, "has a time that is not later than that of the line before");
     truth.poses.push_back(at);
   }
+  leave_out_zeros(is_zero, truth);
   return truth;
 }
 

@@ -44,6 +44,7 @@ struct TruePoses {
   double unit_s = 1;  // of the file's times, in seconds; 0: the file has no times (KITTI)
   // The order of the quaternions where no line of names gives it: then it may be the other one.
   enum class Order { kKnown, kScalarLast, kScalarFirst } order = Order::kKnown;
+  std::vector<std::string> notes;  // on what was left out, or is odd
 };
 
 // Reads true poses: TUM's lines; EuRoC's data.csv (nanoseconds, position, quaternion w x y z, more
@@ -52,7 +53,8 @@ struct TruePoses {
 // one by one. A comment above the first pose that names each column counts, too. Blanks, commas and
 // semicolons separate. Eight numbers with commas and no names are EuRoC's where the times are whole
 // numbers, else TUM's. body_from_camera: of EuRoC's poses, which are the vehicle's; empty: taken as
-// the camera's. Throws BadInput that names the line.
+// the camera's. Poses of a motion capture that lost its body, which are exactly 0 and far from
+// those beside them, are left out. Throws BadInput that names the line.
 TruePoses load_trajectory(const std::string& file, const std::vector<double>& frame_times,
                           const std::optional<std::array<double, 12>>& body_from_camera);
 

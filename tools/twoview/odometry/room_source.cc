@@ -14,7 +14,7 @@
 #include "odometry/accuracy.h"
 #include "odometry/numbers.h"
 #include "odometry/stored_source.h"
-#include "odometry/truth_fit.h"
+#include "odometry/truth_doubts.h"
 #include "room_model/posed_points.h"
 
 namespace cli {
@@ -245,6 +245,7 @@ RoomSource room_source_of_poses(const std::string& path, const std::string& pose
   const std::vector<std::string> names = source.names();
   FrameClock clock{source.film() ? source.film()->clock_start_s : 0, indices, times, names};
   if (clock.names.size() != times.size()) clock.names.clear();
+  for (const std::string& odd : given_poses.notes) made.notes.push_back(odd);
   const std::string note = fit_times(frames, given_poses, clock);
   if (!note.empty()) made.notes.push_back(note);
   const Trajectory& path_of_file = given_poses.poses;
@@ -353,6 +354,8 @@ TruePath true_path(const RoomSource& from, const std::string& file) {
   }
   path.problem = fit_times(own, truth, clock);
   if (path.problem.empty()) path.problem = rotation_words(own, truth);
+  path.notes = truth.notes;
+  for (const std::string& doubt : truth_doubts(own, truth, clock)) path.notes.push_back(doubt);
   path.poses = truth.poses;
   return path;
 }

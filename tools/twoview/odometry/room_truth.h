@@ -23,9 +23,10 @@ nlohmann::ordered_json truth_options_json(const RoomTruthOptions& options);
 
 // True poses of the frames of a scene, in the truth's frame and in metres.
 struct TruePath {
-  bool is_own = false;  // the scene's poses are the true ones
-  Trajectory poses;     // world_from_cam, in the frames' times; empty: not known
-  std::string problem;  // a line on their times or rotations; empty: none
+  bool is_own = false;             // the scene's poses are the true ones
+  Trajectory poses;                // world_from_cam, in the frames' times; empty: not known
+  std::string problem;             // a line on their times or rotations; empty: none
+  std::vector<std::string> notes;  // on what else is odd of them
 };
 
 // The words where --truth-mesh comes without a true path.

@@ -81,6 +81,7 @@ int room(Arguments& a) {
     const TruePath path = true_path(from, a.true_poses);
     truth = true_room.surface(from.scene, path);
     if (!path.problem.empty()) from.notes.push_back(path.problem);
+    from.notes.insert(from.notes.end(), path.notes.begin(), path.notes.end());
   }
   OutputSet files(common.output);
   for (const std::string& name : from.files) files.keep(name);

@@ -22,6 +22,7 @@
 #include "pair/measures.h"
 #include "pair/options.h"
 #include "pair/own_matches.h"
+#include "pair/pose_readings.h"
 #include "pair/reconstruct_pair.h"
 #include "verbs/evaluate_tables.h"
 #include "verbs/verbs.h"
@@ -57,8 +58,9 @@ struct PairReport {
   bool has_truth = false;
   Errors errors;
   std::vector<Errors> own_errors;  // of the systems of --poses, in their order
-  // The same against the inverse of the list's pose; of twoview where its verdict is ok.
-  Errors inverse_errors;
+  // The same against the list's pose as it may have been meant (pair/pose_readings.h), of twoview
+  // where its verdict is ok; against its inverse of the other systems.
+  std::vector<Errors> reading_errors;
   std::vector<Errors> own_inverse_errors;
   std::optional<ShiftEvidence> shift;  // empty where the pair says nothing of its camera
 };
@@ -114,13 +116,13 @@ Errors errors_of(const Matrix3& R, const Vector3& t, const Matrix3& R_true, cons
           translation_error_signed_deg(t, t_true)};
 }
 
-// The errors against the inverse of the list's pose.
-Errors inverse_errors_of(const Matrix3& R, const Vector3& t, const Matrix3& R_true,
-                         const Vector3& t_true) {
-  const Matrix3 inverse_R = transposed(R_true);
-  Vector3 inverse_t = applied(inverse_R, t_true);
-  for (double& value : inverse_t) value = -value;
-  return errors_of(R, t, inverse_R, inverse_t);
+// The errors against the list's pose as it may have been meant.
+std::vector<Errors> reading_errors_of(const Matrix3& R, const Vector3& t, const Matrix3& R_true,
+                                      const Vector3& t_true) {
+  std::vector<Errors> errors;
+  for (const PairReading& reading : other_readings(R_true, t_true))
+    errors.push_back(errors_of(R, t, reading.R, reading.t));
+  return errors;
 }
 
 void add_errors(const Errors& errors, Json& json) {
@@ -137,8 +139,8 @@ void compare_own(const std::vector<OwnPoses>& systems, const Pair& pair, PairRep
     bool is_listed = false;
     const std::optional<OwnPose> pose = system.of(pair.name0, pair.name1, &is_listed);
     report.own_errors.push_back(pose ? errors_of(pose->R, pose->t, pair.R, pair.t) : Errors());
-    report.own_inverse_errors.push_back(pose ? inverse_errors_of(pose->R, pose->t, pair.R, pair.t)
-                                             : Errors());
+    report.own_inverse_errors.push_back(
+        pose ? reading_errors_of(pose->R, pose->t, pair.R, pair.t)[0] : Errors());
     add_errors(report.own_errors.back(), report.json["systems"][system.name]);
   }
 }
@@ -152,7 +154,7 @@ void compare(const Pair& pair, const Outcome& outcome, PairReport& report) {
   if (has_full_pose(v))
     report.errors = errors_of(rotation_of(v), translation_of(v), R_true, t_true);
   if (has_full_pose(v) && v.verdict == TV_VERDICT_OK)
-    report.inverse_errors = inverse_errors_of(rotation_of(v), translation_of(v), R_true, t_true);
+    report.reading_errors = reading_errors_of(rotation_of(v), translation_of(v), R_true, t_true);
   // Precision compares the matches with the true pose, which refers to the given cameras and not to
   // those with a shifted principal point.
   report.json["precision"] =
@@ -466,31 +468,46 @@ Cameras load_cameras(Arguments& a) {
   return cameras;
 }
 
-// Notes where poses are those of the other direction: most of them fit the inverse of the list's
-// pose, and not the pose itself.
-void note_directions(const std::vector<OwnPoses>& systems, const std::vector<PairReport>& reports,
-                     const std::string& list, Common& common) {
-  constexpr double kFitsDeg = 5, kOtherDeg = 10;
-  const auto is_exchanged = [&](const auto& errors_of_report) {
-    size_t count = 0, num_inverse = 0;
-    for (const PairReport& report : reports) {
-      const auto [errors, inverse] = errors_of_report(report);
-      if (inverse.pose_signed() == kFailed) continue;
-      ++count;
-      num_inverse += inverse.pose_signed() < kFitsDeg && errors.pose_signed() > kOtherDeg;
-    }
-    return count > 0 && 2 * num_inverse > count;
-  };
-  if (is_exchanged(
-          [](const PairReport& report) { return std::pair(report.errors, report.inverse_errors); }))
+// Whether most poses fit another reading of the list's, and not the list's as they stand; the
+// number of those that do, else 0. of_report: the errors against both.
+template <typename OfReport>
+size_t num_of_other_reading(const std::vector<PairReport>& reports, const OfReport& of_report) {
+  size_t count = 0, num_other = 0;
+  for (const PairReport& report : reports) {
+    const auto [errors, other] = of_report(report);
+    if (other.pose_signed() == kFailed) continue;
+    ++count;
+    num_other += other.pose_signed() < kNearPoseDeg && errors.pose_signed() > kFarPoseDeg;
+  }
+  return 2 * num_other > count ? num_other : 0;
+}
+
+// Notes where poses fit the list's in another reading, such as those of the other direction.
+void note_readings(const std::vector<OwnPoses>& systems, const std::vector<PairReport>& reports,
+                   const std::string& list, Common& common) {
+  const std::vector<PairReading> readings = other_readings({1, 0, 0, 0, 1, 0, 0, 0, 1}, {0, 0, 1});
+  size_t most = 0, best = 0;
+  for (size_t k = 0; k < readings.size(); ++k) {
+    const size_t count = num_of_other_reading(reports, [k](const PairReport& report) {
+      return std::pair(report.errors,
+                       report.reading_errors.empty() ? Errors() : report.reading_errors[k]);
+    });
+    if (count <= most) continue;
+    most = count;
+    best = k;
+  }
+  if (most > 0 && best == 0)
     common.note("most poses that are ok fit the inverse of those of " + list +
                 ": is its T_0to1 T_1to0? The errors are those against the list as it stands");
+  else if (most > 0)
+    common.note("most poses that are ok fit those of " + list + " if its T_0to1 are " +
+                readings[best].words + ": the errors are those against the list as it stands");
   for (size_t i = 0; i < systems.size(); ++i)
-    if (is_exchanged([i](const PairReport& report) {
+    if (num_of_other_reading(reports, [i](const PairReport& report) {
           return i < report.own_errors.size()
                      ? std::pair(report.own_errors[i], report.own_inverse_errors[i])
                      : std::pair(Errors(), Errors());
-        }))
+        }) > 0)
       common.note("most poses of " + systems[i].name + " fit the inverse of those of " + list +
                   ": are they cam0_from_cam1? The errors are those of the poses as they stand");
 }
@@ -578,7 +595,7 @@ int evaluate(Arguments& a) {
   if (std::none_of(reports.begin(), reports.end(), is_read))
     throw BadInput("none of the " + std::to_string(reports.size()) + " pairs of " + a.pairs +
                    " could be evaluated: " + reports[0].json["error"].get<std::string>());
-  note_directions(systems, reports, a.pairs, common);
+  note_readings(systems, reports, a.pairs, common);
   Json report = report_json(a, systems, reports, session);
   report["interrupted"] = interrupted;
   files.add(name, json_text(report));

@@ -13,6 +13,7 @@
 #include "pair/dense_cloud.h"
 #endif
 #include "pair/own_matches.h"
+#include "pair/pose_readings.h"
 #include "pair/reconstruct_pair.h"
 #include "pair/simple_lens.h"
 #include "pair/truth.h"
@@ -234,6 +235,13 @@ void note_still_matches(const tv_two_view& v, Common& common) {
   common.note(std::to_string(v.num_still) + " of " + std::to_string(v.num_matches) +
               " matches stand still while the rest of the picture moves (on-screen text, a frame, "
               "a watermark): left out");
+}
+
+// Notes a truth that fits an "ok" pose only as another program may have meant it.
+void note_reading(const Truth& truth, const tv_two_view& v, Common& common) {
+  if (!has_full_pose(v) || v.verdict != TV_VERDICT_OK) return;
+  const std::string words = reading_words(rotation_of(v), translation_of(v), truth.R, truth.t);
+  if (!words.empty()) common.note(words);
 }
 
 // Makes the output files that the result permits, in the order of the report.
@@ -468,6 +476,7 @@ int reconstruct(Arguments& a) {
   if (has_truth)
     outcome.json["truth"] =
         truth_json(truth, outcome.picture[0], outcome.two_view, outcome.reconstruction);
+  if (has_truth) note_reading(truth, outcome.two_view, common);
   if (has_truth && outcome.dense)
     add_dense_truth(truth, outcome.picture[0], *outcome.dense, outcome.json["truth"]);
   outcome.json["timings_ms"] = session.take_times(total_ns + dense_ns, true);
