@@ -140,6 +140,15 @@ class Folders(CliTest):
             "place): they are taken as evenly spaced in time; where some are missing, list the "
             "times in frames.txt"])
 
+    def test_a_counter_that_began_anew_is_named(self):
+        self.fill()
+        for i in range(1, COUNT + 1):
+            (self.folder / f"frames/frame{i}.png").rename(
+                self.folder / f"frames/DSC_{(9992 + i - 1) % 9999 + 1:04}.png")
+        self.assertIn(
+            "the pictures' counter seems to have begun anew after DSC_9999.png: DSC_9993.png and",
+            self.track()["notes"][0])
+
     def test_one_picture_is_no_film(self):
         self.fill()
         self.assert_refused(self.run_program("odometry", "frames/frame1.png", "-o", self.out,

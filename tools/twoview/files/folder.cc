@@ -136,6 +136,17 @@ FolderPictures pictures_of(const fs::path& folder) {
 
 bool has_picture_ending(const fs::path& path) { return ends_as(path, kImages); }
 
+namespace {
+
+// Whether this is the last number of a camera's counter: 999, 9999 ...
+bool is_all_nines(int64_t number) {
+  int64_t last = 999;
+  while (last < number) last = 10 * last + 9;
+  return last == number;
+}
+
+}  // namespace
+
 std::string jump_words(const std::vector<std::string>& names) {
   const std::vector<int64_t> counters = counters_of(names);
   std::vector<int64_t> steps;
@@ -151,6 +162,10 @@ std::string jump_words(const std::vector<std::string>& names) {
   if (usual < 1 || first == steps.end()) return "";
   const auto k = static_cast<size_t>(first - steps.begin());
   const auto count = std::count_if(steps.begin(), steps.end(), is_jump);
+  if (count == 1 && counters.front() <= 1 && is_all_nines(counters.back()))
+    return "the pictures' counter seems to have begun anew after " + names.back() + ": " +
+           names[k + 1] + " and what follows it then come before " + names.front() +
+           ", but were taken after " + names[k] + ": rename them";
   return "the numbers of the pictures' names jump from " + names[k] + " to " + names[k + 1] +
          (count > 1 ? " (and in " + std::to_string(count - 1) +
                           (count > 2 ? " more places)" : " more place)")
