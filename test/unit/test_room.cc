@@ -759,6 +759,33 @@ void test_an_inferred_wall_that_a_map_sees_through_vanishes() {
   TEST_ASSERT_TRUE(vertices_near(2) > 500);
 }
 
+// The same distances as measured and as inferred ones, through a wide truncation.
+void test_an_inferred_wall_takes_few_blocks_for_the_same_surface() {
+  tv_room_options options;
+  tv_room_options_init(&options);
+  options.truncation_voxels = 6;
+  int32_t blocks[2];
+  size_t num[2];
+  for (int inferred = 0; inferred < 2; ++inferred) {
+    tv_room* room = nullptr;
+    TEST_ASSERT_EQUAL(TV_OK, tv_room_init(&room, &options, memory, sizeof memory));
+    for (int k = 0; k < 2; ++k) {
+      Map m = wall_at(2.007, Vec3(0, 0, 0), 0.02f);
+      m.map.inferred = inferred;
+      TEST_ASSERT_EQUAL(TV_OK, add(room, m));
+    }
+    tv_room_state state;
+    tv_room_state_init(&state);
+    TEST_ASSERT_EQUAL(TV_OK, tv_room_get_state(room, &state));
+    mesh(room);
+    blocks[inferred] = state.num_blocks, num[inferred] = vertices.size();
+    for (const tv_room_vertex& v : vertices)
+      TEST_ASSERT_FLOAT_WITHIN(0.003f, 2.007f, v.position[1]);
+  }
+  TEST_ASSERT_TRUE(4 * blocks[1] < 3 * blocks[0]);
+  TEST_ASSERT_TRUE(num[0] > 2000 && 100 * num[1] > 98 * num[0]);
+}
+
 }  // namespace
 
 int main(void) {
@@ -779,5 +806,6 @@ int main(void) {
   RUN_TEST(test_a_plane_is_not_carried_where_farther_things_were_measured);
   RUN_TEST(test_a_plane_is_carried_to_the_edge_of_the_mask_and_no_farther);
   RUN_TEST(test_an_inferred_wall_that_a_map_sees_through_vanishes);
+  RUN_TEST(test_an_inferred_wall_takes_few_blocks_for_the_same_surface);
   return UNITY_END();
 }

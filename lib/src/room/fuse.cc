@@ -19,17 +19,26 @@ constexpr double kUnitWeight = 16;
 // Where the nearest pixel is unknown, a neighbour stands in for it with this part of its weight: it
 // fills holes, and yet moves an outline, where others see it, by little.
 constexpr int32_t kBorrowed = 4;
+// Inferred distances have no errors that average out: they are fused at most so many voxels before
+// and behind their surface. That is a voxel across it where it is seen at an angle of 20 degrees.
+constexpr int32_t kInferredVoxels = 3;
 
 struct Fusion {
   const tv_room& room;
   const RoomView& view;
   double voxel, truncation, max_distance;
+  int32_t reach_voxels;  // the map is fused so far before and behind its surface
 };
 
 Fusion fusion_of(const tv_room& room, const RoomView& view) {
   const tv_room_options& o = room.options;
-  return {room, view, o.voxel, o.voxel * o.truncation_voxels,
-          o.max_distance > 0 ? o.max_distance : 1e30};
+  const bool is_near = view.map.inferred != 0 && o.truncation_voxels > kInferredVoxels;
+  return {room,
+          view,
+          o.voxel,
+          o.voxel * o.truncation_voxels,
+          o.max_distance > 0 ? o.max_distance : 1e30,
+          is_near ? kInferredVoxels : o.truncation_voxels};
 }
 
 Measured measured_at(const Fusion& f, int32_t x, int32_t y) {
@@ -126,7 +135,8 @@ bool contribution(const Fusion& f, const Vec3& point, bool near, Voxel* added) {
   }
   if (!near) return false;
   const double distance = distance_near(f, u, v, m) - range;
-  if (!(distance <= f.truncation && distance >= -f.truncation)) return false;
+  const double reach = f.voxel * f.reach_voxels;
+  if (!(distance <= reach && distance >= -reach)) return false;
   const double share = distance / f.truncation;
   const int32_t steps = floor_of(share * kMaxDistance + 0.5);
   // The weight falls from a third of the truncation behind the surface on: what lies there may be
@@ -184,7 +194,7 @@ bool may_see(const Fusion& f, int32_t index) {
   return pixel_of(f.view, point, &u, &v);
 }
 
-// Calls visit(key) for the blocks within the truncation of each measured point: of one pixel in
+// Calls visit(key) for the blocks within the view's reach of each measured point: of one pixel in
 // each square of `step` pixels. Stops where it returns false, and returns false then.
 template <typename Visit>
 bool visit_near(const Fusion& f, const Visit& visit) {
@@ -222,9 +232,8 @@ bool visit_near(const Fusion& f, const Visit& visit) {
         const Mat3& R = f.view.rotation;
         direction[i] = ((R(i, 0) * d[0] + R(i, 1) * d[1]) + R(i, 2) * d[2]);
       }
-      const int32_t samples = f.room.options.truncation_voxels + 1;  // two voxels apart on a ray
-      for (int32_t s = 0; s < samples; ++s) {
-        const double range = m.distance + f.truncation * (2.0 * s / (samples - 1) - 1);
+      for (int32_t s = -f.reach_voxels; s <= f.reach_voxels; s += 2) {
+        const double range = m.distance + s * f.voxel;
         int32_t place[3];
         bool inside = range > 0;
         for (int i = 0; i < 3; ++i) {
