@@ -100,6 +100,14 @@ void test_a_camera_is_contradicted_where_the_direction_would_be_another_one(void
   assert_reason(TV_REASON_CAMERA_CONTRADICTED, e);
 }
 
+void test_a_camera_that_is_assumed_is_contradicted_by_any_misfit(void) {
+  Evidence e = good();
+  e.is_camera_assumed = true;
+  assert_reason(0, e);
+  e.misfit_direction_rad = 0.01 * tv::kPi / 180;
+  assert_reason(TV_REASON_CAMERA_CONTRADICTED, e);
+}
+
 void test_a_rotation_that_hangs_on_one_region_is_doubtful(void) {
   Evidence e = good();
   e.region_shift_rad = 2.49 * tv::kPi / 180;
@@ -379,6 +387,7 @@ int main(void) {
   RUN_TEST(test_each_reason_has_its_threshold);
   RUN_TEST(test_inliers_are_crowded_where_they_are_in_both_images_or_on_a_line_in_one);
   RUN_TEST(test_a_camera_is_contradicted_where_the_direction_would_be_another_one);
+  RUN_TEST(test_a_camera_that_is_assumed_is_contradicted_by_any_misfit);
   RUN_TEST(test_a_rotation_that_hangs_on_one_region_is_doubtful);
   RUN_TEST(test_a_second_model_is_a_motion_or_a_lattice_and_the_opposite_motion_a_repetition);
   RUN_TEST(test_without_a_translation_the_pair_is_refused);

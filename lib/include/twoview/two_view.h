@@ -125,7 +125,8 @@ typedef enum tv_reason {
   /* The matches contradict the cameras as they were given: the rows of a picture were exposed one
      after another while the camera turned (a rolling shutter), or its principal point or lens is
      another one. With cameras that the matches do not contradict, the direction would be another
-     one by more than 10 degrees (camera_direction_rad). */
+     one by more than 10 degrees (camera_direction_rad), or, where the focal length is uncertain
+     (above 0.02), by anything: such a camera is assumed, and so is its lens. */
   TV_REASON_CAMERA_CONTRADICTED = 1 << 9
 } tv_reason;
 

@@ -7,6 +7,7 @@
 #include "base/order.h"
 #include "geometry/sampson.h"
 #include "geometry/transfer.h"
+#include "robust/calibration.h"
 #include "robust/lattice.h"
 #include "robust/ldlt.h"
 #include "robust/models.h"
@@ -269,6 +270,8 @@ void measure_inliers(Fit& f) {
   evidence.num_different = matches.num_unique();
   evidence.threshold_px = f.threshold;
   evidence.num_trials = f.problem.options.num_trials;
+  evidence.is_camera_assumed =
+      std::max(f.problem.options.focal_sigma0, f.problem.options.focal_sigma1) > kUncertainFocal;
   for (int v = 0; v < 2; ++v) measure_spread(f, v, evidence);
   evidence.agreement = agreement_of(f);
 }

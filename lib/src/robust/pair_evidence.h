@@ -43,6 +43,7 @@ struct Evidence : Support {
   // By how much the direction would move with cameras that the matches do not contradict; 0 where
   // they do not contradict the given ones (camera_misfit.h).
   double misfit_direction_rad = 0;
+  bool is_camera_assumed = false;  // its focal length is uncertain: nobody calibrated it
   double median_parallax_rad = 0;  // median parallax of the inliers
   double pixel_angle_rad = 0;      // the parallax that a pixel of noise in both images makes
   // By how much the rotation turns when the inliers of one region are left out; at most kPi.

@@ -78,9 +78,11 @@ bool crowded_matches(const Evidence& e) {
 // they do not contradict the direction would be another one by what counts as wrong, 10 degrees. A
 // smaller difference is in the covariance. So is one of the rotation: a turn while the rows are
 // read moves it by a degree or two, and only long lenses show more, because they leave it open
-// (docs/decisions/0007-verdict-and-covariance.md).
+// (docs/decisions/0007-verdict-and-covariance.md). A camera that is only assumed is contradicted by
+// any difference: what it lacks, most likely its lens, is none of those that were tried.
 bool camera_contradicted(const Evidence& e) {
-  return has_full_pose(e) && e.misfit_direction_rad > 10 * kPi / 180;
+  const double most_rad = e.is_camera_assumed ? 0 : 10 * kPi / 180;
+  return has_full_pose(e) && e.misfit_direction_rad > most_rad;
 }
 
 // The points lie as on a lattice: of the neighbours of a point, more have another point opposite
