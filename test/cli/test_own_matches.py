@@ -217,6 +217,31 @@ class OwnMatches(cli.CliTest):
         a, b = points(self.rows, 0), points(self.rows, 1)
         self.refused(npz(mkpts0=b, mkpts1=a), "look alike", "sides are exchanged")
 
+    def test_pixels_that_were_meant_in_another_way_are_refused_by_that(self):
+        inside = [r for r in self.rows if max(r) < HEIGHT]
+        below = HEIGHT - 1
+        for words, rows in (
+                (("row and column", "in both"), [(r[1], r[0], r[3], r[2]) for r in inside]),
+                (("row and column", "image 1"), [(r[0], r[1], r[3], r[2]) for r in inside]),
+                (("lower edge", "in both"),
+                 [(r[0], below - r[1], r[2], below - r[3]) for r in self.rows]),
+                (("smaller pictures in both", "--matches-resize"),
+                 [tuple(0.8 * v for v in r) for r in self.rows]),
+                (("smaller pictures in image 0",), [(0.9 * r[0], 0.9 * r[1], *r[2:])
+                                                    for r in self.rows])):
+            with self.subTest(words=words):
+                self.refused(npz(mkpts0=points(rows, 0), mkpts1=points(rows, 1)), "look alike",
+                             *words)
+
+    def test_pixels_at_which_the_pictures_are_not_alike_are_noted(self):
+        for cut, noted in ((0, False), (30, True)):
+            rows = [(r[0] - cut, *r[1:]) for r in self.rows]
+            path = self.write("own.npz", npz(mkpts0=points(rows, 0), mkpts1=points(rows, 1)))
+            done = self.reconstruct("--matches", path)
+            self.assertIn(done.returncode, (0, 3))
+            self.assertEqual(b"alike at few of the matches" in b" ".join(done.stdout.split()),
+                             noted)
+
     def test_normalised_coordinates_are_refused(self):
         for scale in (1 / WIDTH, 1 / cli.FOCAL, 2 / WIDTH):
             rows = [tuple(scale * v for v in row) for row in self.rows]

@@ -15,6 +15,7 @@ struct MatchList {
   std::vector<float> ratios;
   // The columns or arrays of the file that were not used.
   std::vector<std::string> left_out;
+  bool fit_pictures = true;  // the pictures look alike at enough of the matches
   size_t size() const { return pixels[0].size() / 2; }
 };
 

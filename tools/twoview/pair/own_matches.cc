@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <opencv2/core.hpp>
 
 #include "base/error.h"
 #include "base/two_views.h"
+#include "pair/match_reading.h"
 
 namespace cli {
 namespace {
@@ -53,51 +53,6 @@ bool leaves_most_empty(const MatchList& matches, size_t image, cv::Size size) {
         2 * matches.pixels[image][2 * i + 1] >= size.height)
       return false;
   return true;
-}
-
-// Whether the pictures around two pixels look alike: squares of 11 x 11 pixels that correlate.
-// False for plain ones, and at the pictures' edges.
-bool look_alike(const cv::Mat& a, const double* pixel_a, const cv::Mat& b, const double* pixel_b) {
-  constexpr int kSide = 11;
-  constexpr double kLeastSigma = 3, kAlike = 0.7;
-  const auto square = [](const cv::Mat& luma, const double* pixel) {
-    const cv::Rect whole(0, 0, luma.cols, luma.rows);
-    const cv::Rect wanted(static_cast<int>(std::lround(pixel[0])) - kSide / 2,
-                          static_cast<int>(std::lround(pixel[1])) - kSide / 2, kSide, kSide);
-    cv::Mat values;
-    if ((wanted & whole) == wanted) luma(wanted).convertTo(values, CV_64F);
-    return values;
-  };
-  const cv::Mat x = square(a, pixel_a), y = square(b, pixel_b);
-  if (x.empty() || y.empty()) return false;
-  cv::Scalar mean_x, mean_y, sigma_x, sigma_y;
-  cv::meanStdDev(x, mean_x, sigma_x);
-  cv::meanStdDev(y, mean_y, sigma_y);
-  if (sigma_x[0] < kLeastSigma || sigma_y[0] < kLeastSigma) return false;
-  return cv::mean((x - mean_x[0]).mul(y - mean_y[0]))[0] > kAlike * sigma_x[0] * sigma_y[0];
-}
-
-// Throws where the pictures agree at the matches only with the sides exchanged: the geometry is as
-// good then, but of the other direction.
-void require_order(const Picture pictures[2], const std::string& name, const MatchList& matches) {
-  constexpr size_t kMost = 400;   // matches that are looked at
-  constexpr double kShare = 0.2;  // least share of them that agree with the sides exchanged
-  constexpr double kClearly = 5;  // times as many as in the order of the file
-  const size_t step = 1 + matches.size() / kMost;
-  size_t count = 0, as_given = 0, exchanged = 0;
-  for (size_t i = 0; i < matches.size(); i += step, ++count) {
-    const double *const p0 = &matches.pixels[0][2 * i], *const p1 = &matches.pixels[1][2 * i];
-    as_given += look_alike(pictures[0].luma, p0, pictures[1].luma, p1);
-    exchanged += look_alike(pictures[0].luma, p1, pictures[1].luma, p0);
-  }
-  const auto alike = static_cast<double>(exchanged);
-  if (count < kTelling || alike < kShare * static_cast<double>(count) ||
-      alike < kClearly * static_cast<double>(as_given + 1))
-    return;
-  throw BadInput(name + ": the pictures look alike at its matches where the sides are exchanged (" +
-                 std::to_string(exchanged) + " of " + std::to_string(count) + "; as they stand, " +
-                 std::to_string(as_given) +
-                 "): exchange both, or name the pictures in the other order");
 }
 
 void triangulate(const Options& options, const MatchList& matches, Outcome& outcome) {
@@ -199,7 +154,7 @@ void fit_to_pictures(const Picture pictures[2], int resize, const std::string& n
       pixel[1] = (pixel[1] + 0.5) * scale_y - 0.5;
     }
   }
-  require_order(pictures, name, matches);
+  matches.fit_pictures = require_reading(pictures, resize < 0, name, matches);
 }
 
 uint64_t estimate_own_matches(Session& session, const Options& options, const MatchList& matches,
@@ -220,10 +175,17 @@ uint64_t estimate_own_matches(Session& session, const Options& options, const Ma
   return now_ns() - start_ns;
 }
 
-std::string left_out_note(const MatchList& matches, const std::string& name) {
+std::vector<std::string> own_match_notes(const MatchList& matches, const std::string& name) {
+  std::vector<std::string> notes;
   std::string text;
   for (const std::string& part : matches.left_out) text += (text.empty() ? "" : ", ") + part;
-  return text.empty() ? text : name + ": not used: " + text;
+  if (!text.empty()) notes.push_back(name + ": not used: " + text);
+  if (!matches.fit_pictures)
+    notes.push_back(name +
+                    ": the pictures look alike at few of the matches, as where a view is far from "
+                    "or turned against the other; where it is not, the pixels may be of cut, "
+                    "framed or stretched pictures, and the pose wrong");
+  return notes;
 }
 
 }  // namespace cli

@@ -5,6 +5,7 @@
 #include <CLI/App.hpp>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "files/matches_file.h"
 #include "pair/options.h"
@@ -31,7 +32,7 @@ struct OwnMatchOptions {
 // their files; `name` is the file of the matches. Throws BadInput that names the first match that
 // is not finite or not in its picture; for normalised coordinates; and, where `resize` is below 0,
 // for matches that leave so much of both pictures empty that they are of smaller ones; and where
-// the pictures look alike at the matches only with the sides exchanged.
+// the pixels were meant in another way (pair/match_reading.h). Sets fit_pictures.
 void fit_to_pictures(const Picture pictures[2], int resize, const std::string& name,
                      MatchList& matches);
 
@@ -41,7 +42,7 @@ void fit_to_pictures(const Picture pictures[2], int resize, const std::string& n
 uint64_t estimate_own_matches(Session& session, const Options& options, const MatchList& matches,
                               Outcome& outcome);
 
-// A note on what was not used of the file; empty where there is nothing.
-std::string left_out_note(const MatchList& matches, const std::string& name);
+// Notes on what was not used of the file, and on matches at which the pictures do not look alike.
+std::vector<std::string> own_match_notes(const MatchList& matches, const std::string& name);
 
 }  // namespace cli

@@ -169,8 +169,8 @@ uint64_t estimate_pair(Arguments& a, const Pair& pair, MatchFolder* folder, Sess
   std::string file;
   MatchList matches = folder->matches_of(pair.name0, pair.name1, &file);
   fit_to_pictures(outcome.picture, a.own.resize, file, matches);
-  const std::string note = left_out_note(matches, "the files of matches");
-  if (!note.empty()) a.common.note(note);
+  for (const std::string& note : own_match_notes(matches, "the files of matches"))
+    a.common.note(note);
   return estimate_own_matches(session, a.common.options, matches, outcome);
 }
 

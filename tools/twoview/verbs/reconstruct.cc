@@ -441,8 +441,7 @@ int reconstruct(Arguments& a) {
   if (recording) recording->add_gravity(common.options.estimate);
   if (a.own.given()) {
     fit_to_pictures(outcome.picture, a.own.resize, a.own.path, own_matches);
-    const std::string note = left_out_note(own_matches, a.own.path);
-    if (!note.empty()) common.note(note);
+    for (const std::string& note : own_match_notes(own_matches, a.own.path)) common.note(note);
   }
   const bool has_truth = !a.truth.empty();
   Truth truth;
