@@ -2,6 +2,8 @@
 """Tests of films as a source of `twoview odometry`: the container's own times, turns, pixels that
 are not square, and films that are cut off or hold no pictures."""
 import math
+import pathlib
+import shutil
 
 from cli_support import CliTest, camera_yaml, main, png
 from films import MIRROR, QUARTERS, atom, full, mov
@@ -196,6 +198,22 @@ class Films(CliTest):
         result = self.track(whole[:-sum(map(len, PICTURES[-8:])) - 100], truth=truth_at(times))
         self.assertEqual(result["truth"]["num_compared"], COUNT - 9)
         self.assertIn("s before its header says: it may be cut off", " ".join(result["notes"]))
+        self.assertEqual(result["film"]["num_damaged"], 1)
+        self.assertIn(f"1 of the film's {COUNT - 8} packets are damaged", " ".join(result["notes"]))
+
+    def test_archives_and_documents_are_no_films(self):
+        self.write("seq/a.png", PICTURES[0])
+        tar = pathlib.Path(shutil.make_archive(self.folder / "a", "tar", self.folder, "seq"))
+        packed = pathlib.Path(shutil.make_archive(self.folder / "a", "zip", self.folder, "seq"))
+        for name, data, kind in (
+                ("a.tar", tar.read_bytes(), "a tar archive"),
+                ("b.mp4", packed.read_bytes(), "a ZIP archive"),
+                ("c.tgz", b"\x1f\x8b\x08" + bytes(600), "a gzip archive"),
+                ("d.7z", b"7z\xbc\xaf\x27\x1c" + bytes(600), "a 7z archive"),
+                ("e.rar", b"Rar!\x1a\x07\x01" + bytes(600), "a RAR archive"),
+                ("f.pdf", b"%PDF-1.7\n" + PICTURES[0], "a PDF document")):
+            self.assert_refused(self.odometry(self.write(name, data), "--fps", 10), name,
+                                f"is {kind}, and no film: give the folder")
 
     def test_what_is_no_film_with_pictures_is_named(self):
         sound = self.write("sound.mov", mov([PICTURES[0]], [0], sound_only=True))

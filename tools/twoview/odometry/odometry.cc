@@ -237,7 +237,8 @@ nlohmann::ordered_json film_json(const std::optional<FilmFacts>& film) {
           {"num_left_out", film->num_left_out},  {"num_begun_anew", film->num_begun_anew},
           {"size", {film->width, film->height}}, {"rotation_deg", film->turn_deg},
           {"mirrored", film->is_mirrored},       {"pixel_aspect", film->pixel_aspect},
-          {"interlaced", film->is_interlaced},   {"joined", film->is_joined}};
+          {"interlaced", film->is_interlaced},   {"joined", film->is_joined},
+          {"num_damaged", film->num_damaged}};
 }
 
 // The camera that was estimated, as a file for the next flight. One that is doubtful is not

@@ -121,6 +121,9 @@ void Film::State::end() {
   const double interval_s = mean_interval_s();
   if (facts.times == FilmFacts::Times::kContainer && container.duration_s > 0)
     facts.missing_s = std::max(0.0, container.duration_s - time_s - interval_s);
+  const PacketCounts packets = count_packets(path);
+  facts.num_packets = packets.num;
+  facts.num_damaged = packets.num_damaged;
 }
 
 Film::Film(const std::string& path, double fps) : state_(std::make_unique<State>()) {
@@ -232,6 +235,11 @@ std::vector<std::string> Film::notes() const {
   if (s.container.num_picture_streams > 1)
     notes.push_back("the film has " + std::to_string(s.container.num_picture_streams) +
                     " streams of pictures: the first one is used");
+  if (f.num_damaged > 0)
+    notes.push_back(std::to_string(f.num_damaged) + " of the film's " +
+                    std::to_string(f.num_packets) +
+                    " packets are damaged: pictures may show what was not there; record or copy "
+                    "it again");
   if (f.missing_s > std::max(kMissing_s, kMissingShare * s.container.duration_s))
     notes.push_back("the film's pictures end " + text_of("%.3g", f.missing_s) +
                     " s before its header says: it may be cut off");

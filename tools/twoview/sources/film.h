@@ -29,7 +29,8 @@ struct FilmFacts {
   int64_t num_begun_anew = 0;  // how often the clock began anew, as where two films are one file
   bool is_interlaced = false;  // by the container: the even and the odd rows may be of two moments
   bool is_joined = false;      // other films follow in the file, which are not read
-  double missing_s = 0;        // how much longer the film is by its header than by its pictures
+  int64_t num_packets = 0, num_damaged = 0;  // once all pictures are read: of the container
+  double missing_s = 0;  // how much longer the film is by its header than by its pictures
 };
 constexpr const char* kJoinedNote =
     "the file holds several films one behind the other (joined as bytes), of which the first is "

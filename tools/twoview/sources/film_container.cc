@@ -13,6 +13,7 @@ extern "C" {
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <memory>
 
 #include "base/error.h"
@@ -71,6 +72,25 @@ bool is_packed(AVStereo3DType type) {
   }
 }
 
+// What a file is by its first bytes where it is an archive or a document; else empty.
+std::string archive_kind(const std::string& path) {
+  constexpr size_t kTarMark = 257;
+  std::string head(512, '\0');
+  std::ifstream file(path, std::ios::binary);
+  file.read(head.data(), static_cast<std::streamsize>(head.size()));
+  const auto begins = [&](const char* mark) { return head.rfind(mark, 0) == 0; };
+  if (begins("PK\3\4") || begins("PK\5\6")) return "a ZIP archive";
+  if (begins("7z\xbc\xaf\x27\x1c")) return "a 7z archive";
+  if (begins("Rar!\x1a\x07")) return "a RAR archive";
+  if (begins("\x1f\x8b")) return "a gzip archive";
+  if (begins("BZh")) return "a bzip2 archive";
+  if (begins("\xfd"
+             "7zXZ"))
+    return "an xz archive";
+  if (head.compare(kTarMark, 5, "ustar") == 0) return "a tar archive";
+  return begins("%PDF") ? "a PDF document" : "";
+}
+
 Open open_film_file(const std::string& path) {
   av_log_set_level(AV_LOG_QUIET);  // the program prints one line of its own
   AVFormatContext* opened = nullptr;
@@ -90,22 +110,44 @@ bool is_pictures(const AVStream& stream) {
          (stream.disposition & AV_DISPOSITION_ATTACHED_PIC) == 0;
 }
 
-// Whether the first packet of the stream has a time: those of a raw stream have none.
-bool has_times(AVFormatContext& film, const AVStream& pictures) {
+const AVStream* first_pictures(const AVFormatContext& film) {
+  for (unsigned i = 0; i < film.nb_streams; ++i)
+    if (is_pictures(*film.streams[i])) return film.streams[i];
+  return nullptr;
+}
+
+// Gives the packets of the stream one by one until `use` returns false.
+template <class Use>
+void read_packets(AVFormatContext& film, const AVStream& pictures, const Use& use) {
   AVPacket* packet = av_packet_alloc();
-  bool is_found = false, has_time = false;
-  while (packet != nullptr && !is_found && av_read_frame(&film, packet) >= 0) {
-    is_found = packet->stream_index == pictures.index;
-    has_time = is_found && (packet->pts != AV_NOPTS_VALUE || packet->dts != AV_NOPTS_VALUE);
+  bool goes_on = packet != nullptr;
+  while (goes_on && av_read_frame(&film, packet) >= 0) {
+    if (packet->stream_index == pictures.index) goes_on = use(*packet);
     av_packet_unref(packet);
   }
   av_packet_free(&packet);
+}
+
+int64_t time_of(const AVPacket& packet) {
+  return packet.pts != AV_NOPTS_VALUE ? packet.pts : packet.dts;
+}
+
+// Whether the first packet of the stream has a time: those of a raw stream have none.
+bool has_times(AVFormatContext& film, const AVStream& pictures) {
+  bool has_time = false;
+  read_packets(film, pictures, [&](const AVPacket& packet) {
+    has_time = time_of(packet) != AV_NOPTS_VALUE;
+    return false;
+  });
   return has_time;
 }
 
 }  // namespace
 
 FilmContainer read_film_container(const std::string& path) {
+  if (const std::string kind = archive_kind(path); !kind.empty())
+    throw BadInput(path + " is " + kind +
+                   ", and no film: give the folder of its pictures, or the film in it");
   const Open film = open_film_file(path);
   FilmContainer result;
   AVStream* pictures = nullptr;
@@ -145,23 +187,31 @@ FilmContainer read_film_container(const std::string& path) {
 
 std::vector<double> picture_times(const std::string& path) {
   const Open film = open_film_file(path);
-  const AVStream* pictures = nullptr;
-  for (unsigned i = 0; i < film->nb_streams && pictures == nullptr; ++i)
-    if (is_pictures(*film->streams[i])) pictures = film->streams[i];
+  const AVStream* const pictures = first_pictures(*film);
   std::vector<double> times;
   if (pictures == nullptr) return times;
   const int64_t start = pictures->start_time == AV_NOPTS_VALUE ? 0 : pictures->start_time;
-  AVPacket* packet = av_packet_alloc();
-  while (packet != nullptr && av_read_frame(film.get(), packet) >= 0) {
-    const int64_t time = packet->pts != AV_NOPTS_VALUE ? packet->pts : packet->dts;
-    if (packet->stream_index == pictures->index && time != AV_NOPTS_VALUE &&
-        (packet->flags & AV_PKT_FLAG_DISCARD) == 0)
+  read_packets(*film, *pictures, [&](const AVPacket& packet) {
+    const int64_t time = time_of(packet);
+    if (time != AV_NOPTS_VALUE && (packet.flags & AV_PKT_FLAG_DISCARD) == 0)
       times.push_back(seconds(time - start, pictures->time_base));
-    av_packet_unref(packet);
-  }
-  av_packet_free(&packet);
+    return true;
+  });
   std::sort(times.begin(), times.end());
   return times;
+}
+
+PacketCounts count_packets(const std::string& path) {
+  const Open film = open_film_file(path);
+  const AVStream* const pictures = first_pictures(*film);
+  PacketCounts counts;
+  if (pictures == nullptr) return counts;
+  read_packets(*film, *pictures, [&](const AVPacket& packet) {
+    ++counts.num;
+    counts.num_damaged += (packet.flags & AV_PKT_FLAG_CORRUPT) != 0;
+    return true;
+  });
+  return counts;
 }
 
 }  // namespace cli

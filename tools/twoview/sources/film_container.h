@@ -27,11 +27,19 @@ struct FilmContainer {
   std::string projection, eyes;
 };
 
-// Throws BadInput where the file is of no format that libavformat knows.
+// Throws BadInput where the file is of no format that libavformat knows, and for an archive or a
+// document, in which libavformat may find pictures without their order.
 FilmContainer read_film_container(const std::string& path);
 
 // The times of all pictures of the stream that FilmContainer describes, in seconds since the
 // stream's start, in rising order; reads the whole file, without decoding.
 std::vector<double> picture_times(const std::string& path);
+
+// How many packets the same stream has, each of one picture as a rule, and how many of them the
+// container calls damaged; reads the whole file, without decoding.
+struct PacketCounts {
+  int64_t num = 0, num_damaged = 0;
+};
+PacketCounts count_packets(const std::string& path);
 
 }  // namespace cli
