@@ -522,6 +522,23 @@ class Formats(cli.CliTest):
         result = json.loads((self.out / "result.json").read_text())
         self.assertIsNone(result["focal_length"])
 
+    def photographs_of(self, *focals):
+        for k, mm in enumerate(focals):
+            picture = png(WIDTH, HEIGHT, cli.stereo_pair()[k % 2])
+            self.write(f"photos/{k}.png", with_exif(picture, exif(**film(mm))))
+        return self.run_program("odometry", "photos", "--fps", "10", "-o", self.out)
+
+    def test_odometry_takes_the_focal_length_of_most_photographs(self):
+        done = self.photographs_of(64, 32, 32, 33, 32)
+        text = b" ".join(done.stdout.split())
+        self.assertIn(b"focal length 32 mm (35 mm equivalent) from EXIF", text)
+        self.assertIn(b"1 of 5 pictures have another focal length in EXIF data than 32 mm, such as "
+                      b"64 mm", text)
+
+    def test_odometry_refuses_photographs_of_several_zooms(self):
+        self.assert_refused(self.photographs_of(32, 32, 64, 64), "2 of 4 pictures",
+                            "another focal length")
+
     def test_odometry_names_pictures_that_are_not_read(self):
         run = ("--fps", "10", "--focal-35mm", "26", "-o", self.out)
         heic = self.write("p.heic", iso(b"heic"))

@@ -68,6 +68,8 @@ class FrameSource {
   virtual std::vector<double> times() const { return {}; }
   // The names of all frames, where they are known beforehand.
   virtual std::vector<std::string> names() const { return {}; }
+  // The focal lengths as for 35 mm film in the EXIF data of the frames that have one.
+  virtual std::vector<double> focals_35mm() const { return {}; }
   // The pose of the camera in the frame of the vehicle that the source's truth describes (EuRoC's
   // T_BS), row-major 3 x 4; empty: the truth describes the camera.
   virtual std::optional<std::array<double, 12>> body_from_camera() const { return {}; }

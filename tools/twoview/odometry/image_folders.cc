@@ -11,6 +11,7 @@
 #include "files/camera_file.h"
 #include "files/camera_formats.h"
 #include "files/camera_set.h"
+#include "files/exif.h"
 #include "files/folder.h"
 #include "files/image_file.h"
 #include "files/mixed_names.h"
@@ -114,6 +115,17 @@ class ImageFolder : public FrameSource {
     std::vector<std::string> names;
     for (const Listed& listed : folder_.frames) names.push_back(listed.name);
     return names;
+  }
+  std::vector<double> focals_35mm() const override {
+    std::vector<double> focals;
+    for (const Listed& listed : folder_.frames) {
+      const std::string file = (fs::path(folder_.path) / listed.name).string();
+      const cv::Size size = header_size(file);
+      if (!listed.problem.empty() || size.area() == 0) continue;
+      const ExifFocal exif = exif_focal(read_file(file, kMaxFileBytes), size.width, size.height);
+      if (exif.focal_35mm > 0) focals.push_back(exif.focal_35mm);
+    }
+    return focals;
   }
   std::optional<std::array<double, 12>> body_from_camera() const override {
     return folder_.body_from_camera;

@@ -461,6 +461,39 @@ void refuse_own_pictures(const std::string& source, const fs::path& folder) {
                    " is read by this run, which writes its pictures there; give another -o");
 }
 
+// The focal length that EXIF data give most pictures of a source, of which the first one's is
+// given; notes say it. Throws BadInput where there is none.
+double focal_by_exif(const FrameSource& source, double of_first, Common& common) {
+  constexpr double kRounding_mm = 1;  // EXIF gives whole millimetres
+  std::vector<double> focals = source.focals_35mm();
+  if (focals.empty()) focals.push_back(of_first);
+  const auto middle = focals.begin() + static_cast<std::ptrdiff_t>(focals.size() / 2);
+  std::nth_element(focals.begin(), middle, focals.end());
+  const double usual = *middle;
+  double other = 0;
+  const auto differs = [&](double focal) {
+    if (std::abs(focal - usual) <= kRounding_mm) return false;
+    other = focal;
+    return true;
+  };
+  const auto num_others = static_cast<size_t>(std::count_if(focals.begin(), focals.end(), differs));
+  char text[240];
+  if (num_others > 0) {
+    std::snprintf(text, sizeof text,
+                  "%zu of %zu pictures have another focal length in EXIF data than %.4g mm, such "
+                  "as %.4g mm",
+                  num_others, focals.size(), usual, other);
+    if (2 * num_others >= focals.size())
+      throw BadInput(std::string(text) + ": give those of one camera and zoom, or --focal-35mm");
+    common.note(text + std::string(", and are used as of the same: take out those of another "
+                                   "camera or zoom"));
+  }
+  std::snprintf(text, sizeof text,
+                "focal length %.4g mm (35 mm equivalent) from EXIF; --camera is better", usual);
+  common.note(text);
+  return usual;
+}
+
 // The lens of a film of which neither the command line nor the source says a camera; empty where
 // one is known. Photographs' EXIF data say the focal length: it is put into the options.
 std::optional<FilmLens> lens_of_film(Arguments& a, FrameSource& source,
@@ -477,12 +510,7 @@ std::optional<FilmLens> lens_of_film(Arguments& a, FrameSource& source,
     if (first.luma.empty()) return {};  // which the flight refuses
     if (source.camera(first, first.luma.cols, first.luma.rows)) return {};
     if (first.exif.focal_35mm > 0) {
-      options->focal_35mm = first.exif.focal_35mm;
-      char text[96];
-      std::snprintf(text, sizeof text,
-                    "focal length %.4g mm (35 mm equivalent) from EXIF; --camera is better",
-                    options->focal_35mm);
-      a.common.note(text);
+      options->focal_35mm = focal_by_exif(source, first.exif.focal_35mm, a.common);
       return {};
     }
   }
