@@ -167,6 +167,11 @@ class OdometryMask(cli.CliTest):
         self.assertGreater(len(seen), 100)
         self.assertLess(max(seen), EDGE + 1)
 
+    def test_masks_without_black_are_noted_for_frames_too(self):
+        mask = self.write("white.png", half_mask(black=254))
+        done = self.succeed(self.odometry(self.set_folder(), "--mask", mask))
+        self.assertIn(b"the mask of all frames leaves nothing out", done.stdout)
+
     def test_each_frame_has_its_mask_in_a_folder(self):
         for i in range(len(flight.TIMES)):
             self.write(f"masks/{i:05}.png.png", half_mask())

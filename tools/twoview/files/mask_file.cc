@@ -72,4 +72,9 @@ double masked_share(const cv::Mat& mask) {
   return 1 - static_cast<double>(cv::countNonZero(mask)) / static_cast<double>(mask.total());
 }
 
+std::string white_mask_note(const Masks& masks, double masked_share, const std::string& pictures) {
+  if (!masks.given() || masked_share > 0) return "";
+  return "the mask of " + pictures + " leaves nothing out: it has no black pixel";
+}
+
 }  // namespace cli

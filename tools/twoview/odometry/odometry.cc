@@ -620,6 +620,9 @@ int odometry(Arguments& a) {
   FlightResult result = result_of(flight, truth, film ? film->clock_start_s : 0,
                                   wanted < 0 ? static_cast<int>(flight.frames().size()) : wanted);
   for (const std::string& note : result.truth_notes) common.note(note);
+  const std::string mask_note =
+      white_mask_note(flight.masks(), flight.masked_share(), "all frames");
+  if (!mask_note.empty()) common.note(mask_note);
   if (!flight.still_mask().empty()) common.note(still_note(result));
   bool was_stopped = stop;
 #ifdef TWOVIEW_HAS_ROOM

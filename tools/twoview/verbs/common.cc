@@ -39,8 +39,8 @@ std::string Common::note_lines() const {
 void add_picture_mask(const std::string& name, Picture& picture, Common& common) {
   const Masks& masks = common.options.masks;
   picture.mask = masks.of(name, picture.luma.cols, picture.luma.rows);
-  if (masks.given() && masked_share(picture.mask) == 0)
-    common.note("the mask of " + name + " leaves nothing out: it has no black pixel");
+  const std::string note = white_mask_note(masks, masked_share(picture.mask), name);
+  if (!note.empty()) common.note(note);
 }
 
 void bring_to_size(Picture& picture, Common& common) {
