@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "pipeline/pair_result.h"
+#include "pipeline/reconstruct.h"
 #include "robust/belief.h"
 #include "robust/verdict.h"
 
@@ -106,6 +107,21 @@ void test_a_camera_that_is_assumed_is_contradicted_by_any_misfit(void) {
   assert_reason(0, e);
   e.misfit_direction_rad = 0.01 * tv::kPi / 180;
   assert_reason(TV_REASON_CAMERA_CONTRADICTED, e);
+}
+
+void test_no_rung_mends_the_cameras(void) {
+  tv_two_view pose = {};
+  pose.num_places = 20;
+  pose.reasons = TV_REASON_SECOND_MOTION;
+  TEST_ASSERT_TRUE(tv::more_could_help(pose));
+  pose.camera_direction_rad = 0.01;  // the matches contradict the cameras
+  TEST_ASSERT_FALSE(tv::more_could_help(pose));
+  pose.reasons |= TV_REASON_TOO_FEW_MATCHES;
+  TEST_ASSERT_TRUE(tv::more_could_help(pose));
+  pose.reasons = TV_REASON_LOW_PARALLAX | TV_REASON_CAMERA_CONTRADICTED;
+  TEST_ASSERT_FALSE(tv::more_could_help(pose));
+  pose.num_places = 19;
+  TEST_ASSERT_TRUE(tv::more_could_help(pose));
 }
 
 void test_a_rotation_that_hangs_on_one_region_is_doubtful(void) {
@@ -388,6 +404,7 @@ int main(void) {
   RUN_TEST(test_inliers_are_crowded_where_they_are_in_both_images_or_on_a_line_in_one);
   RUN_TEST(test_a_camera_is_contradicted_where_the_direction_would_be_another_one);
   RUN_TEST(test_a_camera_that_is_assumed_is_contradicted_by_any_misfit);
+  RUN_TEST(test_no_rung_mends_the_cameras);
   RUN_TEST(test_a_rotation_that_hangs_on_one_region_is_doubtful);
   RUN_TEST(test_a_second_model_is_a_motion_or_a_lattice_and_the_opposite_motion_a_repetition);
   RUN_TEST(test_without_a_translation_the_pair_is_refused);

@@ -36,10 +36,7 @@ bool could_help(const PairArrays& arrays, const Attempt& attempt) {
     constexpr int32_t kFewCertain = 12;
     return attempt.rung < 2 || num_certain(arrays, attempt.num_matches) >= kFewCertain;
   }
-  // What a pose lacks by the cameras alone, in enough places, no view gives.
-  constexpr uint32_t kOfCameras = TV_REASON_LOW_PARALLAX | TV_REASON_CAMERA_CONTRADICTED;
-  constexpr int32_t kEnoughPlaces = 20;
-  return (e.reasons & ~kOfCameras) != 0 || e.num_places < kEnoughPlaces;
+  return more_could_help(e);
 }
 
 // The rung to climb to after an attempt at `rung`. Rung 1 takes longer than rung 2 and finds less;
@@ -156,6 +153,13 @@ void adjust(tv_context* context, const PairTask& task, PairArrays& arrays, tv_tw
 }
 
 }  // namespace
+
+bool more_could_help(const tv_two_view& pose) {
+  uint32_t of_cameras = TV_REASON_LOW_PARALLAX | TV_REASON_CAMERA_CONTRADICTED;
+  if (pose.camera_direction_rad > 0) of_cameras |= TV_REASON_SECOND_MOTION;
+  constexpr int32_t kEnoughPlaces = 20;
+  return (pose.reasons & ~of_cameras) != 0 || pose.num_places < kEnoughPlaces;
+}
 
 int32_t reconstruct(tv_context* context, const PairTask& task, PairArrays* arrays,
                     Attempt* attempt) {

@@ -11,4 +11,10 @@ namespace tv {
 int32_t reconstruct(tv_context* context, const PairTask& task, PairArrays* arrays,
                     Attempt* attempt);
 
+// Whether more keypoints or views could give what a pose that is not "ok" lacks. What it lacks by
+// the cameras alone, in enough places, none gives; and with cameras that the matches contradict
+// some of them have a motion of their own, which more matches may only hide.
+// docs/algorithms/effort.md.
+bool more_could_help(const tv_two_view& pose);
+
 }  // namespace tv
