@@ -5,6 +5,7 @@
 #include "api/validate.h"
 #include "api/within.h"
 #include "odometry/adjust.h"
+#include "odometry/keyframe.h"
 #include "odometry/loop.h"
 #include "odometry/map_bytes.h"
 #include "odometry/track.h"
@@ -33,24 +34,6 @@ int32_t* points_in_order(const tv_odometry& odometry, int32_t** ranks) {
   *ranks = arena_alloc<int32_t>(scratch, room);
   rank_points(odometry.map, places, *ranks);
   return places;
-}
-
-// Of a point's position: its distance along the ray from where it was first seen, and a pixel
-// across.
-void write_covariance(double focal_px, const MapPoint& point, double covariance[9]) {
-  double ray[3], distance_sq = 0;
-  for (int c = 0; c < 3; ++c) {
-    ray[c] = point.position[c] - static_cast<double>(point.seen_from[c]);
-    distance_sq += ray[c] * ray[c];
-  }
-  const double along = static_cast<double>(point.depth_sigma);
-  const double across = kTypicalNoise / focal_px;
-  for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 3; ++c) {
-      covariance[3 * r + c] = (along * along - across * across) * (ray[r] * ray[c]) +
-                              (r == c ? across * across * distance_sq : 0);
-    }
-  }
 }
 
 }  // namespace
@@ -103,7 +86,7 @@ tv_status tv_odometry_points(const tv_odometry* odometry, tv_map_point* points, 
     points[n].num_observations = point.num_observations;
     points[n].grey = point.grey;
     std::copy_n(point.position, 3, points[n].position);
-    tv::write_covariance(odometry->camera.model.fx, point, points[n].covariance);
+    tv::point_covariance(*odometry, point, points[n].covariance);
   }
   return TV_OK;
 }

@@ -233,6 +233,22 @@ void make_points(Odometry* odometry, int32_t keyframe, const Frame& frame, bool 
   *next = kMostNeighbours;
 }
 
+void point_covariance(const Odometry& odometry, const MapPoint& point, double covariance[9]) {
+  double ray[3], distance_sq = 0;
+  for (int c = 0; c < 3; ++c) {
+    ray[c] = point.position[c] - static_cast<double>(point.seen_from[c]);
+    distance_sq += ray[c] * ray[c];
+  }
+  const double along = static_cast<double>(point.depth_sigma);
+  const double across = kTypicalNoise / odometry.camera.model.fx;
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) {
+      covariance[3 * r + c] = (along * along - across * across) * (ray[r] * ray[c]) +
+                              (r == c ? across * across * distance_sq : 0);
+    }
+  }
+}
+
 void remove_bad_points(Odometry* odometry) {
   Map& map = odometry->map;
   clear_marks(&map);

@@ -25,6 +25,10 @@ int32_t triangulate_matches(Odometry* odometry, int32_t keyframe0, int32_t keyfr
                             const tv_correspondence* matches, int32_t num, double least_angle_rad,
                             const uint8_t* greys);
 
+// The covariance of a point's position: its distance along the ray from where it was first seen,
+// and a pixel across.
+void point_covariance(const Odometry& odometry, const MapPoint& point, double covariance[9]);
+
 // Removes points that frames do not find where they must appear.
 void remove_bad_points(Odometry* odometry);
 

@@ -69,6 +69,25 @@ void forget_removed(Map* map, int32_t num) {
   std::memmove(map->removed, map->removed + num, as_size(map->num_removed) * sizeof *map->removed);
 }
 
+int32_t pose_in_world(const Map& map, int32_t reference_id, Rigid* pose) {
+  int32_t id = reference_id;
+  int32_t k = find_keyframe(map, id);
+  // A removed keyframe leads to a kept one in one step, in maps of earlier versions in several.
+  for (int32_t steps = 0; k < 0 && steps <= map.num_removed; ++steps) {
+    int32_t n = 0;
+    while (n < map.num_removed && map.removed[n].id != id) ++n;
+    if (n == map.num_removed) return -1;
+    scale_by(map.removed[n].scale, pose->t);
+    *pose = compose(map.removed[n].kept_from_removed, *pose);
+    id = map.removed[n].kept_id;
+    k = find_keyframe(map, id);
+  }
+  if (k < 0) return -1;
+  scale_by(map.keyframes[k].scale, pose->t);
+  *pose = compose(inverse(map.keyframes[k].cam_from_world), *pose);
+  return k;
+}
+
 void make_map(const MapSizes& sizes, Arena& arena, Map* map) {
   const size_t points = as_size(sizes.max_points);
   map->sizes = sizes;

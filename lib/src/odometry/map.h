@@ -176,6 +176,11 @@ void remove_lone_points(Map* map);
 // Whether attitudes keep a segment upright.
 bool is_upright(const Map& map, int32_t segment);
 
+// Turns a pose relative to a keyframe, in that one's unit, into world_from_cam, also where the
+// keyframe was removed since. Returns the index of the keyframe that it hangs on now; -1 where the
+// map does not know the keyframe, and the pose is of no use then.
+int32_t pose_in_world(const Map& map, int32_t reference_id, Rigid* pose);
+
 // Forgets where the first `num` keyframes that were removed lie.
 void forget_removed(Map* map, int32_t num);
 

@@ -341,6 +341,12 @@ void change_scale(Odometry* odometry, int32_t from, int32_t to) {
   odometry->num_contrary = 0;
 }
 
+void enter_segment(Odometry* odometry, int32_t segment) {
+  if (segment != odometry->segment) change_scale(odometry, odometry->segment, segment);
+  odometry->segment = segment;
+  odometry->is_upright = is_upright(odometry->map, segment);
+}
+
 void gather_ways(Odometry* odometry) {
   begin_sums(&odometry->scale);
   for (int32_t k = 1; k < odometry->map.num_keyframes; ++k) add_way(odometry, k);

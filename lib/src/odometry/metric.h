@@ -58,4 +58,8 @@ void join_scale(const MetricScale& other, double scale, Odometry* odometry);
 // `to`.
 void change_scale(Odometry* odometry, int32_t from, int32_t to);
 
+// The frames that follow belong to this segment: whether it is upright is read from the map, and
+// what is known of its scale is taken up.
+void enter_segment(Odometry* odometry, int32_t segment);
+
 }  // namespace tv

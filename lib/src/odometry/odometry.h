@@ -203,11 +203,4 @@ using Odometry = tv_odometry;
 // Forgets the map and every frame.
 void start_anew(Odometry* odometry);
 
-// The frames that follow belong to this segment: whether it is upright is read from the map, and
-// what is known of its scale is taken up.
-void enter_segment(Odometry* odometry, int32_t segment);
-
-// How many bytes of scratch the stages take.
-size_t scratch_bytes(const tv_odometry_options& options);
-
 }  // namespace tv
