@@ -1,31 +1,26 @@
 // The entry points of the room: they validate, and call the stages of lib/src/room.
 #include "twoview/room.h"
 
-#include <algorithm>
-#include <cmath>
-
 #include "api/sized.h"
 #include "api/validate.h"
 #include "api/within.h"
 #include "geometry/essential.h"
 #include "room/coarsen.h"
-#include "room/fuse.h"
 #include "room/infer.h"
 #include "room/mesh.h"
 #include "room/planes.h"
+#include "room/records.h"
 
 namespace tv {
 namespace {
 
 constexpr int32_t kMaxSide = 16384;
-constexpr int32_t kMaxLevels = 16;
 constexpr tv_room_options kDefaults = {sizeof(tv_room_options), 3, 0.03, 0.0};
 constexpr tv_room_mesh_options kMeshDefaults = {
     sizeof(tv_room_mesh_options), 1, 64, 0, {0, 0, 0}, {0, 0, 0}, nullptr, 0, 0, 0};
 constexpr tv_room_plane_options kPlaneDefaults = {
     sizeof(tv_room_plane_options), 0, 0, {0, 0, 0}, 0.02};
 constexpr tv_room_infer_options kInferDefaults = {sizeof(tv_room_infer_options), 3, nullptr, 0, 0};
-constexpr double kLeastArea = 640;  // squares of a voxel's side: 40 sides of a block
 
 tv_status read_options(const tv_room_options* given, tv_room_options* options) {
   *options = kDefaults;
@@ -82,20 +77,7 @@ tv_status read_view(const tv_room* room, const tv_depth_map* map, RoomView* view
   return TV_OK;
 }
 
-// All memory of a room.
-Bytes bytes_of(const tv_room& room) {
-  const uint8_t* from = reinterpret_cast<const uint8_t*>(&room);
-  const Voxel* end = room.voxels + static_cast<size_t>(room.cap_blocks) * kBlockVoxels;
-  return {from, static_cast<size_t>(reinterpret_cast<const uint8_t*>(end) - from)};
-}
-
-// The record of a map that was added with these contents, of equal ones the last; -1 without.
-int32_t record_of(const tv_room& room, const RoomView& view) {
-  const uint64_t digest = digest_of(view);
-  int32_t k = room.num_records - 1;
-  while (k >= 0 && room.records[k].digest != digest) --k;
-  return k;
-}
+Bytes bytes_of(const tv_room& room) { return {&room, room_bytes(room)}; }
 
 tv_status read_plane_request(const tv_room& room, const tv_room_plane_options* given,
                              PlaneRequest* request) {
@@ -110,17 +92,7 @@ tv_status read_plane_request(const tv_room& room, const tv_room_plane_options* g
               false,
               {0, 0, 0},
               o.gravity_sigma_rad};
-  double length = 0;
-  for (const double g : o.gravity) length = std::max(length, std::fabs(g));
-  if (length > 0) {
-    double sum = 0;
-    for (int i = 0; i < 3; ++i) {
-      request->up[i] = -o.gravity[i] / length;
-      sum += request->up[i] * request->up[i];
-    }
-    for (double& u : request->up) u /= std::sqrt(sum);
-    request->has_gravity = true;
-  }
+  request->has_gravity = up_of(o.gravity, request->up);
   const bool valid =
       o.reserved == 0 && o.min_area >= 0 && o.gravity_sigma_rad > 0 && o.gravity_sigma_rad <= 1;
   return valid ? TV_OK : TV_ERR_ARGUMENT;
@@ -151,19 +123,10 @@ tv_status read_request(const tv_room& room, const tv_room_mesh_options* given,
   if (!are_finite(o.planes, o.num_planes)) return TV_ERR_NOT_FINITE;
   *request = {o.min_maps, o.min_piece_triangles, o.measured_only != 0, {}, {},
               o.planes,   o.num_planes,          o.max_sigma};
-  bool everywhere = true;
-  for (int i = 0; i < 3; ++i) everywhere = everywhere && o.min[i] == 0 && o.max[i] == 0;
-  for (int i = 0; i < 3; ++i) {
-    valid = valid && o.min[i] <= o.max[i];
-    const double block = room.options.voxel * kBlockSide;
-    const auto place = [block](double x) {
-      const double c = x / block;
-      return c > kBlockReach ? kBlockReach : c < -kBlockReach ? -kBlockReach : floor_of(c);
-    };
-    request->from[i] = everywhere ? -kBlockReach : place(o.min[i]);
-    request->to[i] = everywhere ? kBlockReach : place(o.max[i]);
-  }
-  return valid ? TV_OK : TV_ERR_ARGUMENT;
+  for (int i = 0; i < 3; ++i) valid = valid && o.min[i] <= o.max[i];
+  if (!valid) return TV_ERR_ARGUMENT;
+  choose_blocks(room, o.min, o.max, request);
+  return TV_OK;
 }
 
 }  // namespace
@@ -210,24 +173,16 @@ tv_status tv_room_add(tv_room* room, const tv_depth_map* map) {
   const tv_status status = tv::read_view(room, map, &view);
   if (status != TV_OK) return status;
   if (room->num_maps == TV_ROOM_MAX_MAPS) return TV_ERR_LIMITS;
-  if (!tv::list_near_blocks(*room, view, true)) return TV_ERR_CAPACITY;
-  tv::add_view(*room, view);
-  room->records[room->num_records++] = {tv::digest_of(view), room->num_calls, 0};
-  ++room->num_maps;
-  return TV_OK;
+  return tv::add_map(*room, view) ? TV_OK : TV_ERR_CAPACITY;
 }
 
 tv_status tv_room_remove(tv_room* room, const tv_depth_map* map) {
   tv::RoomView view;
   const tv_status status = tv::read_view(room, map, &view);
   if (status != TV_OK) return status;
-  int32_t k = tv::record_of(*room, view);
-  if (k < 0) return TV_ERR_ARGUMENT;
-  tv::list_near_blocks(*room, view, false);
-  tv::subtract_view(*room, view, room->records[k].added_at);
-  --room->num_maps;
-  --room->num_records;
-  for (; k < room->num_records; ++k) room->records[k] = room->records[k + 1];
+  const int32_t record = tv::find_record(*room, view);
+  if (record < 0) return TV_ERR_ARGUMENT;
+  tv::remove_map(*room, view, record);
   return TV_OK;
 }
 
@@ -235,10 +190,9 @@ tv_status tv_room_see_through(tv_room* room, const tv_depth_map* map) {
   tv::RoomView view;
   const tv_status status = tv::read_view(room, map, &view);
   if (status != TV_OK) return status;
-  const int32_t k = tv::record_of(*room, view);
-  if (k < 0) return TV_ERR_ARGUMENT;
-  tv::see_through(*room, view, room->records[k].added_at);
-  room->records[k].added_at = room->num_calls;
+  const int32_t record = tv::find_record(*room, view);
+  if (record < 0) return TV_ERR_ARGUMENT;
+  tv::see_through_again(*room, view, record);
   return TV_OK;
 }
 
@@ -258,18 +212,7 @@ tv_status tv_room_get_state(const tv_room* room, tv_room_state* state) {
   s.num_blocks = room->num_blocks;
   s.cap_blocks = room->cap_blocks;
   s.voxel = room->options.voxel;
-  const double block = s.voxel * tv::kBlockSide;
-  bool first = true;
-  for (int32_t k = 0; k < room->end_blocks; ++k) {
-    if (room->blocks[k].key == 0) continue;
-    const tv::BlockPlace place = tv::place_of(room->blocks[k].key);
-    const int32_t at[3] = {place.x, place.y, place.z};
-    for (int i = 0; i < 3; ++i) {
-      if (first || at[i] * block < s.min[i]) s.min[i] = at[i] * block;
-      if (first || (at[i] + 1) * block > s.max[i]) s.max[i] = (at[i] + 1) * block;
-    }
-    first = false;
-  }
+  tv::find_bounds(*room, s.min, s.max);
   tv::write_sized(s, state);
   return TV_OK;
 }

@@ -52,6 +52,12 @@ tv_room* make_room(const tv_room_options& options, void* memory, size_t size_byt
   return room;
 }
 
+size_t room_bytes(const tv_room& room) {
+  const Voxel* end = room.voxels + static_cast<size_t>(room.cap_blocks) * kBlockVoxels;
+  return static_cast<size_t>(reinterpret_cast<const uint8_t*>(end) -
+                             reinterpret_cast<const uint8_t*>(&room));
+}
+
 uint64_t block_key(const tv_room& room, const BlockPlace& place) {
   const auto part = [](int32_t c) { return static_cast<uint64_t>(c + kBlockReach) & kPlaceMask; };
   return part(place.x) | part(place.y) << kPlaceBits | part(place.z) << (2 * kPlaceBits) |
@@ -97,6 +103,21 @@ void free_block(tv_room& room, int32_t index) {
   if (index < room.first_unused) room.first_unused = index;
   while (room.end_blocks > 0 && room.blocks[room.end_blocks - 1].key == 0) --room.end_blocks;
   if (room.first_unused > room.end_blocks) room.first_unused = room.end_blocks;
+}
+
+void find_bounds(const tv_room& room, double min[3], double max[3]) {
+  const double block = room.options.voxel * kBlockSide;
+  bool first = true;
+  for (int32_t k = 0; k < room.end_blocks; ++k) {
+    if (room.blocks[k].key == 0) continue;
+    const BlockPlace place = place_of(room.blocks[k].key);
+    const int32_t at[3] = {place.x, place.y, place.z};
+    for (int i = 0; i < 3; ++i) {
+      if (first || at[i] * block < min[i]) min[i] = at[i] * block;
+      if (first || (at[i] + 1) * block > max[i]) max[i] = (at[i] + 1) * block;
+    }
+    first = false;
+  }
 }
 
 bool is_void(const tv_room& room, int32_t block) {

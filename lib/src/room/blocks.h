@@ -112,6 +112,9 @@ namespace tv {
 // How many blocks fit beside the rest into size_bytes. Lays the room out at `memory`.
 tv_room* make_room(const tv_room_options& options, void* memory, size_t size_bytes);
 
+// All memory of a room, from its struct on.
+size_t room_bytes(const tv_room& room);
+
 uint64_t block_key(const tv_room& room, const BlockPlace& place);
 BlockPlace place_of(uint64_t key);
 
@@ -124,6 +127,9 @@ void free_block(tv_room& room, int32_t index);
 inline Voxel* voxels_of(const tv_room& room, int32_t block) {
   return room.voxels + static_cast<size_t>(block) * kBlockVoxels;
 }
+
+// Writes the box around all blocks; zeros stay where there is none.
+void find_bounds(const tv_room& room, double min[3], double max[3]);
 
 // Whether no map saw a surface in any voxel of the block.
 bool is_void(const tv_room& room, int32_t block);

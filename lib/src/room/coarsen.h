@@ -5,6 +5,8 @@
 
 namespace tv {
 
+inline constexpr int32_t kMaxLevels = 16;  // so often a room can be coarsened
+
 void coarsen(tv_room& room);
 
 }  // namespace tv

@@ -333,6 +333,21 @@ void leave_out_unused_vertices(MeshOutput* output) {
 
 }  // namespace
 
+void choose_blocks(const tv_room& room, const double min[3], const double max[3],
+                   MeshRequest* request) {
+  bool everywhere = true;
+  for (int i = 0; i < 3; ++i) everywhere = everywhere && min[i] == 0 && max[i] == 0;
+  const double block = room.options.voxel * kBlockSide;
+  const auto place = [block](double x) {
+    const double c = x / block;
+    return c > kBlockReach ? kBlockReach : c < -kBlockReach ? -kBlockReach : floor_of(c);
+  };
+  for (int i = 0; i < 3; ++i) {
+    request->from[i] = everywhere ? -kBlockReach : place(min[i]);
+    request->to[i] = everywhere ? kBlockReach : place(max[i]);
+  }
+}
+
 void count_mesh(tv_room& room, const MeshRequest& request, int64_t* num_vertices,
                 int64_t* num_triangles) {
   Sample grid[kGrid * kGrid * kGrid];

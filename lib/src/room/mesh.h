@@ -23,6 +23,10 @@ struct MeshOutput {
   int32_t num_vertices, num_triangles;
 };
 
+// The blocks that a box meets; all of them where its corners are all 0.
+void choose_blocks(const tv_room& room, const double min[3], const double max[3],
+                   MeshRequest* request);
+
 // Finds the cells that have a vertex, and counts what write_mesh needs room for.
 void count_mesh(tv_room& room, const MeshRequest& request, int64_t* num_vertices,
                 int64_t* num_triangles);

@@ -1,5 +1,6 @@
 #include "room/planes.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "geometry/vector3.h"
@@ -257,6 +258,19 @@ double share_behind(const tv_room& room, const Plane& plane) {
 }
 
 }  // namespace
+
+bool up_of(const double gravity[3], double up[3]) {
+  double length = 0;
+  for (int i = 0; i < 3; ++i) length = std::max(length, std::fabs(gravity[i]));
+  if (!(length > 0)) return false;
+  double sum = 0;
+  for (int i = 0; i < 3; ++i) {
+    up[i] = -gravity[i] / length;
+    sum += up[i] * up[i];
+  }
+  for (int i = 0; i < 3; ++i) up[i] /= std::sqrt(sum);
+  return true;
+}
 
 int32_t find_planes(tv_room& room, const PlaneRequest& request, tv_room_plane* planes,
                     int32_t cap) {
