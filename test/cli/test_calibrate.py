@@ -124,6 +124,39 @@ class RealBoards(CalibrateTest):
         np.testing.assert_array_equal(file.getNode("camera_matrix").mat(), ours_K)
 
 
+    def changed(self, images, change):
+        """Writes the pictures, those that `change` has a function for changed; their names."""
+        for i, image in enumerate(images):
+            picture = cv2.imread(str(image), cv2.IMREAD_GRAYSCALE)
+            cv2.imwrite(str(self.folder / f"l{i:02}.png"), change.get(i, np.array)(picture))
+        return [f"l{i:02}.png" for i in range(len(images))]
+
+    def test_a_half_of_other_pictures_is_refused_and_named(self):
+        images = self.images_of(OPENCV_BOARDS / "images", "left*.jpg")
+        kinds = {
+            "turned": lambda p: p[::-1, ::-1],
+            "zoomed": lambda p: cv2.resize(p[24:456, 32:608], (640, 480)),
+        }
+        for kind, change in kinds.items():
+            with self.subTest(kind=kind):
+                names = self.changed(images, {i: change for i in range(1, 13, 2)})
+                self.assert_refused(
+                    self.calibrate(*names), "6 of 13 views contradict the others",
+                    "l01.png, l03.png, l05.png, l07.png, l09.png, l11.png", "is that of neither")
+
+    def test_a_few_mirrored_pictures_are_left_out_and_named(self):
+        images = self.images_of(OPENCV_BOARDS / "images", "left*.jpg")
+        names = self.changed(images, {i: lambda p: p[:, ::-1] for i in (2, 6, 11)})
+        result = self.calibrated(*names)
+        outliers = [n for n, status in status_of(result).items() if status == "outlier"]
+        self.assertEqual(outliers, ["l02.png", "l06.png", "l11.png"])
+        self.assertEqual([w["name"] for w in result["warnings"]][:1], ["contradicting_views"])
+        seen = [corners_of(v) for v in result["views"] if v["status"] == "used"]
+        points = [(boards.board_points() / boards.SQUARE).astype(np.float32)] * len(seen)
+        _, K, *_ = cv2.calibrateCamera(points, seen, (640, 480), None, None)
+        np.testing.assert_allclose(camera_of(result)[0], K, atol=0.02)
+
+
 class KnownCameras(CalibrateTest):
     def check_lens(self, lens, seed, model=None):
         model = model or lens[0]

@@ -6,6 +6,7 @@
 #include <opencv2/calib3d.hpp>
 
 #include "base/error.h"
+#include "calibration/two_cameras.h"
 
 namespace cli {
 namespace {
@@ -23,6 +24,7 @@ constexpr double kTiltedDeg = 15, kLittleCoverage = 0.6, kHighRmsPx = 0.5, kLowR
 // A larger standard deviation gives a warning: those of fx and fy as a share of these, and those of
 // cx and cy as a share of the image width.
 constexpr double kLargeFocalSigma = 0.005, kLargeCentreSigma = 0.005;
+constexpr int kPose = 6;  // parameters of a view's pose
 
 std::vector<cv::Point3f> corners_of(const Board& board) {
   std::vector<cv::Point3f> corners;
@@ -39,17 +41,14 @@ struct Answer {
   std::vector<cv::Mat> rotations, translations;
 };
 
-// Standard deviations of fx fy cx cy and the distortion. With J = [A | B], where A holds the
-// derivatives by the camera and B those by the view's own pose, the information is the sum over
-// views of A'A - A'B (B'B)^-1 B'A. OpenCV's own values are not used: cv::fisheye does not return
-// them, and those of calibrateCamera are too large up to OpenCV 4.6, which counts a corner as one
-// measurement.
-std::vector<double> sigma_of(const std::vector<cv::Point3f>& board,
-                             const std::vector<Corners>& seen, const Answer& answer, Lens lens) {
-  const int shared = 4 + static_cast<int>(distortion_names(lens).size()), own = 6;
+// The squared residuals of each view as a function of the camera. With J = [A | B], where A holds
+// the derivatives by the camera and B those by the view's own pose, the view's information is
+// A'A - A'B (B'B)^-1 B'A.
+std::vector<ViewForm> forms_of(const std::vector<cv::Point3f>& board,
+                               const std::vector<Corners>& seen, const Answer& answer, Lens lens) {
+  const int shared = 4 + static_cast<int>(distortion_names(lens).size());
   const std::vector<cv::Point3d> points(board.begin(), board.end());
-  cv::Mat information = cv::Mat::zeros(shared, shared, CV_64F);
-  double sum_sq = 0, num_values = 0;
+  std::vector<ViewForm> forms(seen.size());
   for (size_t i = 0; i < seen.size(); ++i) {
     std::vector<cv::Point2d> projected;
     cv::Mat J, A, B;
@@ -58,20 +57,37 @@ std::vector<double> sigma_of(const std::vector<cv::Point3f>& board,
       cv::fisheye::projectPoints(points, projected, rotation, translation, answer.K,
                                  answer.distortion, 0, J);
       A = J.colRange(0, shared);  // columns of J: camera, pose, skew
-      B = J.colRange(shared, shared + own);
+      B = J.colRange(shared, shared + kPose);
     } else {
       cv::projectPoints(points, rotation, translation, answer.K, answer.distortion, projected, J);
-      B = J.colRange(0, own);
-      A = J.colRange(own, own + shared);
+      B = J.colRange(0, kPose);
+      A = J.colRange(kPose, kPose + shared);
     }
-    const cv::Mat across = A.t() * B;
-    information += A.t() * A - across * (B.t() * B).inv(cv::DECOMP_SVD) * across.t();
-    for (size_t j = 0; j < projected.size(); ++j) {
-      const cv::Point2d residual = cv::Point2d(seen[i][j]) - projected[j];
-      sum_sq += residual.dot(residual);
-    }
-    num_values += 2.0 * static_cast<double>(projected.size()) - own;
+    std::vector<cv::Point2d> residuals;
+    for (size_t j = 0; j < projected.size(); ++j)
+      residuals.push_back(cv::Point2d(seen[i][j]) - projected[j]);
+    const cv::Mat r = cv::Mat(residuals).reshape(1, 2 * static_cast<int>(residuals.size()));
+    const cv::Mat across = A.t() * B * (B.t() * B).inv(cv::DECOMP_SVD);
+    forms[i].information = A.t() * A - across * (B.t() * A);
+    forms[i].gradient = A.t() * r - across * (B.t() * r);
+    forms[i].sum_sq = r.dot(r);
   }
+  return forms;
+}
+
+// Standard deviations of fx fy cx cy and the distortion. OpenCV's own values are not used:
+// cv::fisheye does not return them, and those of calibrateCamera are too large up to OpenCV 4.6,
+// which counts a corner as one measurement.
+std::vector<double> sigma_of(const std::vector<ViewForm>& forms, size_t num_corners) {
+  const int shared = forms[0].gradient.rows;
+  cv::Mat information = cv::Mat::zeros(shared, shared, CV_64F);
+  double sum_sq = 0;
+  for (const ViewForm& form : forms) {
+    information += form.information;
+    sum_sq += form.sum_sq;
+  }
+  const double num_values =
+      static_cast<double>(forms.size()) * (2.0 * static_cast<double>(num_corners) - kPose);
   const cv::Mat covariance =
       information.inv(cv::DECOMP_SVD) * (sum_sq / std::max(1.0, num_values - shared));
   std::vector<double> sigma;
@@ -158,7 +174,7 @@ ViewFit fit_of(const tv_camera& camera, const std::vector<cv::Point3f>& board, c
 }
 
 Calibration solve_once(const std::vector<BoardView>& views, const Board& board, cv::Size image,
-                       Lens lens) {
+                       Lens lens, std::vector<ViewForm>& forms) {
   std::vector<Corners> seen;
   std::vector<size_t> indices;
   for (size_t i = 0; i < views.size(); ++i) {
@@ -181,7 +197,8 @@ Calibration solve_once(const std::vector<BoardView>& views, const Board& board, 
   }
   result.camera = camera_of(answer, image, lens);
   check(tv_camera_check(&result.camera), "no camera explains these views");
-  result.sigma = sigma_of(corners, seen, answer, lens);
+  forms = forms_of(corners, seen, answer, lens);
+  result.sigma = sigma_of(forms, corners.size());
   double sum_sq = 0;
   for (size_t i = 0; i < seen.size(); ++i) {
     ViewFit fit =
@@ -229,6 +246,45 @@ std::string formatted(const char* format, double a, double b = 0) {
   return text;
 }
 
+// The names of views, at most kNamed of them, such as "a.png, b.png and 4 more".
+std::string names_of(const std::vector<BoardView>& views, const std::vector<size_t>& indices) {
+  constexpr size_t kNamed = 8;
+  std::string text;
+  for (size_t i = 0; i < std::min(indices.size(), kNamed); ++i)
+    text += (i ? ", " : "") + views[indices[i]].name;
+  if (indices.size() <= kNamed) return text;
+  return text + " and " + std::to_string(indices.size() - kNamed) + " more";
+}
+
+// Marks a part of at most a third of the views that another camera saw as outliers, and describes
+// it where it is more than one view. Throws BadInput if the part is larger. Returns false if one
+// camera explains the views, or they are too few to tell.
+bool set_aside_second_camera(std::vector<BoardView>& views, const Calibration& c,
+                             const std::vector<ViewForm>& forms, std::string& description) {
+  if (c.fits.size() < kFewViews) return false;
+  const SecondCamera second = find_second_camera(forms);
+  if (second.views.empty()) return false;
+  std::vector<size_t> indices;
+  for (const size_t i : second.views) indices.push_back(c.fits[i].view);
+  char change[120];
+  std::snprintf(change, sizeof change,
+                "about (%.0f, %.0f) px in the centre, (%.1f, %.1f) %% in fx and fy",
+                second.change[2], second.change[3], 100 * second.change[0] / c.camera.fx,
+                100 * second.change[1] / c.camera.fy);
+  const std::string text =
+      std::to_string(indices.size()) + " of " + std::to_string(forms.size()) +
+      " views contradict the others, " + change + ": " + names_of(views, indices) +
+      " (cropped, shifted, turned, mirrored, stretched, zoomed, or of another camera?)";
+  if (3 * indices.size() > forms.size())
+    throw BadInput(text + "; one camera for all is that of neither: calibrate each part by itself");
+  for (const size_t i : indices) {
+    views[i].reason = Reason::kOutlier;
+    views[i].detail = std::string("contradicts the others, ") + change;
+  }
+  if (indices.size() > 1) description = text + ": they are left out";
+  return true;
+}
+
 // Returns true if the four corner pixels of the image have rays.
 bool reaches_the_image_corners(const tv_camera& camera) {
   for (const double x : {0.0, camera.width - 1.0})
@@ -268,12 +324,17 @@ std::vector<int> corners_by_cell(const std::vector<BoardView>& views, cv::Size i
 
 Calibration calibrate_camera(std::vector<BoardView>& views, const Board& board, cv::Size image,
                              Lens lens) {
-  Calibration result = solve_once(views, board, image, lens);
+  std::vector<ViewForm> forms;
+  Calibration result = solve_once(views, board, image, lens, forms);
+  std::string contradiction;
+  if (set_aside_second_camera(views, result, forms, contradiction))
+    result = solve_once(views, board, image, lens, forms);
   const size_t num_at_first = result.fits.size();
   for (int round = 0; round < kOutlierRounds; ++round) {
     if (!reject_outliers(views, result, num_at_first)) break;
-    result = solve_once(views, board, image, lens);
+    result = solve_once(views, board, image, lens, forms);
   }
+  result.contradiction = contradiction;
   std::sort(result.fits.begin(), result.fits.end(),
             [](const ViewFit& a, const ViewFit& b) { return a.view < b.view; });
   const std::vector<int> cells = corners_by_cell(views, image);
@@ -284,6 +345,7 @@ Calibration calibrate_camera(std::vector<BoardView>& views, const Board& board, 
 
 std::vector<Warning> warnings_of(const Calibration& c) {
   std::vector<Warning> warnings;
+  if (!c.contradiction.empty()) warnings.push_back({"contradicting_views", c.contradiction});
   const double num_views = static_cast<double>(c.fits.size());
   if (c.fits.size() < kFewViews)
     warnings.push_back(

@@ -37,14 +37,16 @@ struct Calibration {
   double rms_px = 0;
   std::vector<ViewFit> fits;  // one ViewFit for each used view
   double coverage = 0;        // share of the 8 x 8 cells of the image that hold a corner
+  std::string contradiction;  // views that were left out as those of another camera; or empty
 };
 
 constexpr int kMinViews = 3, kCells = 8;
 
 // Estimates the camera from the used views. It repeats the estimate without the views whose error
-// is far above that of the others, which it marks as outliers. Residuals are those of the library's
-// lens models. Throws BadInput if OpenCV finds no camera, if tv_camera_check refuses the camera, or
-// if its lens does not reach a corner of the board.
+// is far above that of the others, which it marks as outliers, and without a third of the views or
+// less that another camera saw. Residuals are those of the library's lens models. Throws BadInput
+// if OpenCV finds no camera, if tv_camera_check refuses the camera, if its lens does not reach a
+// corner of the board, or if more than a third of at least ten views are of another camera.
 Calibration calibrate_camera(std::vector<BoardView>& views, const Board& board, cv::Size image,
                              Lens lens);
 
