@@ -95,6 +95,18 @@ class Films(CliTest):
         self.assertEqual(result["num_frames"], COUNT - 1)
         self.assertIn("1 picture of the film is left out", " ".join(result["notes"]))
 
+    def test_pictures_that_are_given_again_while_the_camera_moves_have_no_pose(self):
+        shown = [min(k, 8) if k < 12 else k for k in range(COUNT)]  # it stands for three pictures
+        result = self.track(mov([PICTURES[k] for k in shown], TIMES))
+        self.assertEqual(result["num_repeated"], 3)
+        self.assertEqual(result["num_tracked"], COUNT - 3)
+        self.assertLess(result["truth"]["ate_rmse_percent_of_path"], 1)
+        self.assertIn("3 pictures are the one before again, the first frame_000009.png",
+                      " ".join(result["notes"]))
+        rows = (self.out / "frames.csv").read_text().splitlines()[1:]
+        self.assertEqual([k for k, row in enumerate(rows) if row.split(",")[3] == "repeated"],
+                         [9, 10, 11])
+
     def test_a_film_whose_clock_begins_anew_goes_on(self):
         # Two recordings in one file: the clock falls by more than a second. The first picture
         # after that is left out, since it may be one that is out of order.

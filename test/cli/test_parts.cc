@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <limits>
+#include <opencv2/core.hpp>
 #include <vector>
 
 #include "base/error.h"
@@ -21,6 +22,7 @@
 #include "odometry/flight.h"
 #include "odometry/outputs.h"
 #include "odometry/reach.h"
+#include "odometry/repeated_pictures.h"
 #include "odometry/truth_doubts.h"
 #include "pair/camera_advice.h"
 #include "pair/measures.h"
@@ -953,10 +955,43 @@ void test_a_frame_found_afterwards_is_where_the_camera_can_have_flown(void) {
   TEST_ASSERT_TRUE(reach.contains(7, 0, {0.3, 0, 0}));
 }
 
+// Bit n of the first number: picture n of a sequence counts as given again while the camera moved;
+// of the second: the camera waited. Each picture is one level, so that levels are positions.
+struct Repeated {
+  uint32_t stood = 0, waited = 0;
+};
+Repeated repeated_of(const std::vector<int>& levels) {
+  RepeatedPictures pictures;
+  for (size_t n = 0; n < levels.size(); ++n)
+    pictures.is_repeated(cv::Mat(4, 4, CV_8U, cv::Scalar(levels[n])), n);
+  pictures.end();
+  Repeated result;
+  for (const size_t n : pictures.stood()) result.stood |= 1u << n;
+  for (const size_t n : pictures.waited()) result.waited |= 1u << n;
+  return result;
+}
+
+void check_repeated(const std::vector<int>& levels, uint32_t stood, uint32_t waited) {
+  const Repeated found = repeated_of(levels);
+  TEST_ASSERT_EQUAL_HEX32(stood, found.stood);
+  TEST_ASSERT_EQUAL_HEX32(waited, found.waited);
+}
+
+void test_a_picture_that_stands_is_told_from_a_camera_that_does() {
+  check_repeated({0, 20, 40, 60, 60, 60, 120, 140}, 0x30, 0);          // two pictures are missing
+  check_repeated({0, 20, 40, 61, 60, 60, 66, 66, 140, 160}, 0xf0, 0);  // with a key frame in it
+  check_repeated({0, 20, 40, 60, 60}, 0x10, 0);                        // to the end
+  check_repeated({0, 20, 40, 60, 70, 75, 77, 78, 78, 78, 80, 90}, 0, 0);  // it stops smoothly
+  check_repeated({0, 20, 40, 60, 60, 66, 72, 80, 100}, 0, 0x30);   // it begins to move again slowly
+  check_repeated({200, 0, 5, 10, 15, 20, 220, 25, 30, 35}, 0, 0);  // two flashes
+  check_repeated({9, 9, 9, 9, 9, 11, 14, 20}, 0, 0);               // before the start
+}
+
 }  // namespace
 
 int main() {
   UNITY_BEGIN();
+  RUN_TEST(test_a_picture_that_stands_is_told_from_a_camera_that_does);
   RUN_TEST(test_a_clock_that_falls_and_rises_again_began_anew);
   RUN_TEST(test_a_truth_with_the_other_order_of_its_quaternions_is_told_from_the_right_one);
   RUN_TEST(test_times_that_are_frame_numbers_are_understood_and_said);

@@ -57,6 +57,9 @@ Rgb colour_at(const cv::Mat& picture, double scale_x, double scale_y, double x, 
   return {bgr[2], bgr[1], bgr[0]};
 }
 
+// In seconds, as in the library: over a longer pause velocities say no way.
+constexpr double kLongestPause_s = 0.25;
+
 Pose pose_of(const double R[9], const double t[3]) {
   Pose pose;
   std::copy(R, R + 9, pose.R.begin());
@@ -205,11 +208,36 @@ void Flight::track_frame(SourceFrame frame) {
     if (is_first && !frame.luma.empty()) throw;
     if (num_unreadable_++ == 0) first_problem_ = e.what();
     record.unreadable = true;
-    record.status = state_.status == TV_ODOMETRY_STARTING ? TV_ODOMETRY_STARTING : TV_ODOMETRY_LOST;
+    record.status = lost_status();
     gap_ = true;
     frames_.push_back(record);
     return;
   }
+  if (repeated_.is_repeated(frame.luma, frames_.size())) {
+    record.withheld = true;
+    record.status = lost_status();
+    frames_.push_back(record);
+    return;
+  }
+  // Over a pause that is longer, motion is not foretold.
+  if (!given_.empty() && frames_.back().withheld)
+    gap_ = gap_ || frame.time_s - frames_[given_.back()].time_s > kLongestPause_s;
+  give(frame, record);
+  picture_ = frame.luma;
+  colour_ = frame.colour;
+  if (record.is_keyframe && options_.keeps_pictures)
+    thumbnails_[static_cast<int>(given_.size())] = thumbnail_of(frame.luma);
+  if (record.is_keyframe) keep_colours(frame);
+  masked_ += cli::masked_share(mask_);
+  given_.push_back(frames_.size());
+  frames_.push_back(record);
+}
+
+int32_t Flight::lost_status() const {
+  return state_.status == TV_ODOMETRY_STARTING ? TV_ODOMETRY_STARTING : TV_ODOMETRY_LOST;
+}
+
+void Flight::give(const SourceFrame& frame, FlightFrame& record) {
   tv_odometry_frame input;
   tv_odometry_frame_init(&input);
   input.gap = frame.gap || gap_ ? 1 : 0;
@@ -252,14 +280,6 @@ void Flight::track_frame(SourceFrame frame) {
     record.reference_id = state_.reference_id;
     record.reference_from_cam = pose_of(state_.reference_from_cam_R, state_.reference_from_cam_t);
   }
-  picture_ = frame.luma;
-  colour_ = frame.colour;
-  if (record.is_keyframe && options_.keeps_pictures)
-    thumbnails_[static_cast<int>(given_.size())] = thumbnail_of(frame.luma);
-  if (record.is_keyframe) keep_colours(frame);
-  masked_ += cli::masked_share(mask_);
-  given_.push_back(frames_.size());
-  frames_.push_back(record);
 }
 
 std::optional<Vector3> Flight::down(int32_t segment) const {
@@ -332,11 +352,12 @@ void Flight::finish(const std::atomic<bool>& stop) {
     frame.segment = key.keyframe.segment;
     frame.pose = pose_of(key.keyframe.world_from_cam_R, key.keyframe.world_from_cam_t);
   }
+  settle_repeated();
   if (!source_.can_run_again() || keyframes.empty()) return;
   // A frame that was followed by its turn alone has the position of the frame before it.
   for (FlightFrame& frame : frames_) {
     const bool is_known = frame.origin != PoseOrigin::kNone && frame.status != TV_ODOMETRY_ROTATION;
-    if (!is_known && !frame.unreadable) missing[frame.index] = &frame;
+    if (!is_known && !frame.unreadable && !frame.is_repeated) missing[frame.index] = &frame;
   }
   int last = missing.empty() ? -1 : missing.rbegin()->first;
   if (!without_picture.empty()) last = std::max(last, without_picture.rbegin()->first);
@@ -361,6 +382,35 @@ void Flight::finish(const std::atomic<bool>& stop) {
     return frame.index < last;
   };
   source_.run(wanted, consume, stop);
+}
+
+void Flight::settle_repeated() {
+  repeated_.end();
+  for (const size_t n : repeated_.stood()) {
+    frames_[n].is_repeated = true;
+    frames_[n].origin = PoseOrigin::kNone;
+    frames_[n].segment = -1;
+  }
+  for (const size_t n : repeated_.waited()) {
+    FlightFrame& frame = frames_[n];
+    if (!frame.withheld) continue;
+    const FlightFrame& before = frames_[n - 1];
+    frame.status = before.status;
+    frame.reasons = before.reasons;
+    frame.map_reasons = before.map_reasons;
+    frame.origin = before.origin;
+    frame.segment = before.segment;
+    frame.pose = before.pose;
+  }
+}
+
+std::string Flight::repeated_note() const {
+  if (repeated_.stood().empty()) return "";
+  const size_t count = repeated_.stood().size();
+  return std::to_string(count) + (count == 1 ? " picture is" : " pictures are") +
+         " the one before again, the first " + frames_[repeated_.stood()[0]].name +
+         ", while the camera moved: a film or a stream that stood or was filled up; " +
+         (count == 1 ? "it has" : "they have") + " no pose";
 }
 
 void Flight::locate(SourceFrame frame, FlightFrame& record, int32_t near_id, const Reach& reach) {
@@ -421,8 +471,9 @@ std::vector<FlightKeyframe> keyframes_of(const tv_odometry* odometry, int32_t ma
 
 bool Flight::ended_tracked() const {
   if (frames_.empty()) return false;
-  const FlightFrame& last = frames_.back();
-  return !last.unreadable && last.live_segment >= 0;
+  auto last = frames_.rbegin();
+  while (last->withheld && std::next(last) != frames_.rend()) ++last;
+  return !last->unreadable && last->live_segment >= 0;
 }
 
 std::vector<FlightKeyframe> Flight::keyframes() const {

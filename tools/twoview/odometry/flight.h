@@ -16,6 +16,7 @@
 #include "odometry/frames.h"
 #include "odometry/poses.h"
 #include "odometry/reach.h"
+#include "odometry/repeated_pictures.h"
 #include "twoview/odometry.h"
 
 namespace cli {
@@ -79,7 +80,8 @@ class Flight {
   void finish(const std::atomic<bool>& stop);
 
   const std::vector<FlightFrame>& frames() const { return frames_; }
-  // The frame that was given to the odometry after `number` others: unreadable ones do not count.
+  // The frame that was given to the odometry after `number` others: unreadable and repeated ones do
+  // not count.
   const FlightFrame& given(int number) const {
     return frames_[given_[static_cast<size_t>(number)]];
   }
@@ -121,6 +123,10 @@ class Flight {
   const Masks& masks() const { return options_.masks; }
   const std::vector<std::string>& mask_files() const { return options_.masks.files(); }
   int num_unreadable() const { return num_unreadable_; }
+  // Pictures that the source gave again while the camera moved on. After finish().
+  int num_repeated() const { return static_cast<int>(repeated_.stood().size()); }
+  // A line on them; empty where there are none.
+  std::string repeated_note() const;
   const std::string& first_problem() const { return first_problem_; }
   // Whether the source ended before its frames could be tracked to the end, or --max-frames did.
   bool ended_tracked() const;
@@ -148,6 +154,12 @@ class Flight {
   void prepare(SourceFrame& frame);
   void start(const SourceFrame& frame);
   void track_frame(SourceFrame frame);
+  // The status of a frame that is not given to the tracker.
+  int32_t lost_status() const;
+  // Gives the frame to the tracker; record then has what is known of it.
+  void give(const SourceFrame& frame, FlightFrame& record);
+  // Of frames whose picture was repeated, what the pictures after them say.
+  void settle_repeated();
   // Says what was found of the frame that was given last.
   void tell_source();
   void add_still_mask();
@@ -176,6 +188,7 @@ class Flight {
   // The colours of the keypoints of the frames that were given and became keyframes.
   std::map<int, std::vector<Rgb>> colours_;
   bool gap_ = false;  // a frame was left out before the next one
+  RepeatedPictures repeated_;
   int num_unreadable_ = 0;
   std::string first_problem_;
 };

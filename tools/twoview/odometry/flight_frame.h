@@ -22,6 +22,8 @@ struct FlightFrame {
   uint32_t reasons = 0;
   uint32_t map_reasons = 0;
   bool unreadable = false;
+  bool withheld = false;     // not given to the tracker: its picture is the one before again
+  bool is_repeated = false;  // by what came later, the camera moved on meanwhile: it has no pose
   bool is_keyframe = false, relocated = false, loop_closed = false;
   bool attitude_ignored = false;
   std::optional<Matrix3> attitude;  // world_from_cam of a world whose z axis points down

@@ -616,6 +616,7 @@ int odometry(Arguments& a) {
   if (const int count = flight.num_unreadable(); count > 0)
     common.note(std::to_string(count) + (count == 1 ? " frame" : " frames") +
                 " could not be used, the first: " + flight.first_problem());
+  if (const std::string note = flight.repeated_note(); !note.empty()) common.note(note);
   const std::optional<FilmFacts> film = source->film();
   FlightResult result = result_of(flight, truth, film ? film->clock_start_s : 0,
                                   wanted < 0 ? static_cast<int>(flight.frames().size()) : wanted);

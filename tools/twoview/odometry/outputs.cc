@@ -76,7 +76,7 @@ Json times_json(const Flight& flight) {
   std::vector<double> times;
   double sum = 0;
   for (const FlightFrame& frame : flight.frames()) {
-    if (frame.unreadable) continue;
+    if (frame.unreadable || frame.withheld) continue;
     times.push_back(frame.time_ms);
     sum += frame.time_ms;
   }
@@ -280,6 +280,7 @@ Json flight_json(const FlightResult& result) {
   json["num_tracked"] = num_tracked;
   json["num_located"] = num_located;
   json["num_unreadable"] = flight.num_unreadable();
+  json["num_repeated"] = flight.num_repeated();
   json["num_keyframes"] = result.keyframes.size();
   json["num_points"] = result.points.size();
   json["num_segments"] = count_segments(result.keyframes);
@@ -361,6 +362,7 @@ std::string covariances_text(const std::vector<FlightKeyframe>& keyframes) {
 
 std::string reasons_text(const FlightFrame& frame) {
   if (frame.unreadable) return "unreadable";
+  if (frame.is_repeated) return "repeated";
   std::string text;
   for (uint32_t bit = 1; bit != 0 && bit <= frame.reasons; bit <<= 1) {
     if ((frame.reasons & bit) == 0) continue;

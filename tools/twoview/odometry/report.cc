@@ -147,7 +147,8 @@ Json frames_json(const FlightResult& result) {
     time.push_back(rounded(frame.time_s - frames[0].time_s, 1e-3));
     status.push_back(frame.status);
     inliers.push_back(frame.num_inliers);
-    ms.push_back(frame.unreadable ? Json(nullptr) : Json(rounded(frame.time_ms, 1e-3)));
+    ms.push_back(frame.unreadable || frame.withheld ? Json(nullptr)
+                                                    : Json(rounded(frame.time_ms, 1e-3)));
     reasons.push_back(reasons_text(frame));
     if (frame.is_keyframe) key.push_back(i);
     error.push_back(nullptr);
