@@ -2,6 +2,8 @@
 
 #include "drone/drone.h"
 
+#include <CLI/App.hpp>
+
 namespace cli {
 
 void add_drone(CLI::App& program, Run& run, AddDroneVerb add_simulate) {

@@ -1,8 +1,7 @@
 // twoview drone: how its verbs are added.
 #pragma once
 
-#include <CLI/App.hpp>
-
+#include "base/cli_fwd.h"
 #include "verbs/common.h"
 
 namespace cli {

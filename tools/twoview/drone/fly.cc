@@ -1,6 +1,7 @@
 // twoview drone fly: control by keyboard. A movement ends 0.5 s after the last repeat of its
 // key; then the drone hovers. Without --live nothing is sent.
 
+#include <CLI/App.hpp>
 #include <cstdlib>
 #include <cstring>
 #include <memory>

@@ -1,6 +1,8 @@
 // twoview drone info: prints the drone's state and configuration.
 
+#include <CLI/App.hpp>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "base/error.h"

@@ -1,5 +1,6 @@
 #include "drone/options.h"
 
+#include <CLI/App.hpp>
 #include <cstdio>
 
 namespace cli {

@@ -1,8 +1,9 @@
 // The options that the verbs of a drone share.
 #pragma once
 
-#include <CLI/App.hpp>
 #include <string>
+
+#include "base/cli_fwd.h"
 
 namespace cli {
 

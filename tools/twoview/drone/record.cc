@@ -1,6 +1,8 @@
 // twoview drone record: stores the drone's navdata and live video packets, unchanged.
 
 #include <unistd.h>
+#include <CLI/App.hpp>
+#include <nlohmann/json.hpp>
 
 #include <memory>
 #include <optional>

@@ -1,6 +1,8 @@
 // twoview drone replay: plays a recording through the same driver as a live drone's data.
 
+#include <CLI/App.hpp>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "base/error.h"

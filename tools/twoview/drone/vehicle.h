@@ -3,11 +3,11 @@
 // driver vehicle_none.cc stands in, and each of these functions throws BadInput that says so.
 #pragma once
 
-#include <CLI/App.hpp>
 #include <atomic>
 #include <functional>
 #include <string>
 
+#include "base/cli_fwd.h"
 #include "drone/estimates.h"
 #include "recording/driver_session.h"
 

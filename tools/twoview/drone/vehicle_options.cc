@@ -1,4 +1,6 @@
 #include "drone/options.h"
+
+#include <CLI/App.hpp>
 #include "drone/vehicle.h"
 
 namespace cli {

@@ -1,6 +1,7 @@
 #include "odometry/camera_check.h"
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 namespace cli {
 

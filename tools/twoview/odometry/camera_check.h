@@ -2,7 +2,7 @@
 // docs/algorithms/focal_length.md.
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "odometry/flight.h"

@@ -1,10 +1,12 @@
 // twoview map info FILE, twoview map export FILE -o OUT and twoview map merge FILES -o OUT: what
 // maps hold, without their frames.
 
+#include <CLI/App.hpp>
 #include <algorithm>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 

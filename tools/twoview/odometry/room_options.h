@@ -1,14 +1,14 @@
 // What `twoview room` and `twoview odometry --room` have in common: options, progress, notes.
 #pragma once
 
-#include <CLI/App.hpp>
 #include <atomic>
 #include <functional>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "base/cli_fwd.h"
 #include "base/output.h"
 #include "odometry/frames.h"
 #include "odometry/room_source.h"

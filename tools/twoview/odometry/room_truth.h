@@ -2,11 +2,11 @@
 // the world of the room.
 #pragma once
 
-#include <CLI/App.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "base/cli_fwd.h"
 #include "odometry/poses.h"
 #include "room_model/truth.h"
 

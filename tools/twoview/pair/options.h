@@ -2,12 +2,12 @@
 // "options" object of every result.
 #pragma once
 
-#include <CLI/App.hpp>
 #include <cstdint>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <variant>
 
+#include "base/cli_fwd.h"
 #include "files/mask_file.h"
 #include "twoview/twoview.h"
 

@@ -1,8 +1,10 @@
 #include "pair/own_matches.h"
 
+#include <CLI/App.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "base/two_views.h"

@@ -2,11 +2,11 @@
 // pictures as they are used, and the pose and points that they give.
 #pragma once
 
-#include <CLI/App.hpp>
 #include <cstdint>
 #include <string>
 #include <vector>
 
+#include "base/cli_fwd.h"
 #include "files/matches_file.h"
 #include "pair/options.h"
 #include "pair/result.h"

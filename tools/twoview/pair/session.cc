@@ -1,6 +1,7 @@
 #include "pair/session.h"
 
 #include <time.h>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 

@@ -1,7 +1,7 @@
 // Reads the true pose and depths of a pair, and computes the errors of a reconstruction.
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <opencv2/core/mat.hpp>
 #include <string>
 

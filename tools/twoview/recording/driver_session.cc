@@ -1,5 +1,7 @@
 #include "recording/driver_session.h"
 
+#include <nlohmann/json.hpp>
+
 #include "base/error.h"
 #include "twoview_drivers/h264.h"
 

@@ -1,7 +1,9 @@
 #include "recording/recording_input.h"
 
+#include <CLI/App.hpp>
 #include <cmath>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "base/output.h"

@@ -3,11 +3,11 @@
 // without the driver contains recording_none.cc instead of recording_input.cc.
 #pragma once
 
-#include <CLI/App.hpp>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "base/cli_fwd.h"
 #include "base/terminal.h"
 #include "pair/result.h"
 #include "pair/session.h"

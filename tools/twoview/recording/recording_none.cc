@@ -2,6 +2,9 @@
 // --recording.
 #include "recording/recording_input.h"
 
+#include <CLI/App.hpp>
+#include <nlohmann/json.hpp>
+
 namespace cli {
 
 struct RecordingInput::State {};

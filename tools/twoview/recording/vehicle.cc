@@ -1,6 +1,7 @@
 #include "recording/vehicle.h"
 
 #include <time.h>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <cstring>

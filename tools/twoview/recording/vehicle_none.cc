@@ -1,5 +1,6 @@
 // Replaces vehicle.cc in a program without MAVLink's driver.
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "recording/vehicle.h"

@@ -1,5 +1,6 @@
 #include "recording/vehicle_session.h"
 
+#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "base/error.h"

@@ -1,7 +1,7 @@
 // The room in a report: a viewer of the surface, the plan, and why parts are missing.
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 

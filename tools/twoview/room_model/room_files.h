@@ -1,7 +1,7 @@
 // The room among the files and the JSON of a verb.
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 

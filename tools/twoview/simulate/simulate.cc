@@ -3,8 +3,10 @@
 
 #include "simulate/simulate.h"
 
+#include <CLI/App.hpp>
 #include <cmath>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "base/error.h"

@@ -1,11 +1,13 @@
 // twoview calibrate: estimates a camera from pictures of a chessboard and reports how reliable it
 // is.
 
+#include <CLI/App.hpp>
 #include <algorithm>
 #include <charconv>
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <numeric>
 
 #include "base/error.h"

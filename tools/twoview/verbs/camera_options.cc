@@ -1,7 +1,9 @@
 #include "verbs/camera_options.h"
 
+#include <CLI/App.hpp>
 #include <algorithm>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "files/camera_formats.h"

@@ -2,12 +2,12 @@
 // file, from the focal length that the user gives, or from the photographs' EXIF data.
 #pragma once
 
-#include <CLI/App.hpp>
 #include <array>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
+#include "base/cli_fwd.h"
 #include "files/camera_file.h"
 #include "files/image_file.h"
 

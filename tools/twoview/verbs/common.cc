@@ -1,6 +1,8 @@
 #include "verbs/common.h"
 
 #include <unistd.h>
+#include <CLI/App.hpp>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <cstdio>

@@ -2,11 +2,11 @@
 // terminal colours.
 #pragma once
 
-#include <CLI/App.hpp>
 #include <functional>
 #include <string>
 #include <vector>
 
+#include "base/cli_fwd.h"
 #include "files/image_file.h"
 #include "pair/options.h"
 

@@ -1,7 +1,9 @@
 // twoview detect IMAGE: writes keypoints as CSV and as a picture.
 
+#include <CLI/App.hpp>
 #include <cstdio>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "base/output.h"
 #include "base/terminal.h"

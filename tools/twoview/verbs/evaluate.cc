@@ -1,6 +1,7 @@
 // twoview evaluate PAIRS.txt: estimates the poses of many pairs and reports SuperGlue's measures of
 // their errors.
 
+#include <CLI/App.hpp>
 #include <atomic>
 #include <cmath>
 #include <cstdio>
@@ -8,6 +9,7 @@
 #include <filesystem>
 #include <limits>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "base/output.h"

@@ -1,7 +1,7 @@
 // The tables of an evaluation as CSV and for LaTeX, from its report.
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 namespace cli {

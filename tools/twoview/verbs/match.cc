@@ -1,7 +1,9 @@
 // twoview match A B: writes matches as CSV and as a picture; it needs no camera.
 
+#include <CLI/App.hpp>
 #include <cstdio>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "base/output.h"

@@ -2,6 +2,7 @@
 
 #include <sys/wait.h>
 #include <unistd.h>
+#include <CLI/App.hpp>
 
 #include <cerrno>
 #include <cstdio>

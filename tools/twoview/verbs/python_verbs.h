@@ -2,9 +2,10 @@
 // the source tree, or below share/twoview in an installation.
 #pragma once
 
-#include <CLI/App.hpp>
 #include <string>
 #include <vector>
+
+#include "base/cli_fwd.h"
 
 namespace cli {
 

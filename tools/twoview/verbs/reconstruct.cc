@@ -1,9 +1,11 @@
 // twoview reconstruct A B, or --recording DIR: from two views to a pose, a cloud, pictures and a
 // report.
 
+#include <CLI/App.hpp>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "base/output.h"

@@ -1,10 +1,12 @@
 // twoview triangulate MATCHES: computes points from matched pixels and a known pose.
 
+#include <CLI/App.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "base/error.h"

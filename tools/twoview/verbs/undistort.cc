@@ -1,9 +1,11 @@
 // twoview undistort IMAGE...: computes the images that a camera without distortion would have
 // taken.
 
+#include <CLI/App.hpp>
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <opencv2/imgproc.hpp>
 #include <set>
 

@@ -1,5 +1,6 @@
 #include "verbs/usage_errors.h"
 
+#include <CLI/App.hpp>
 #include <algorithm>
 
 namespace cli {
