@@ -27,12 +27,21 @@ endif()
 # TWOVIEW_PRECOMPILE asks for it. Other release builds do without, so that one of them finds a
 # forgotten #include. A launcher turns this off, because ccache would not keep the objects. clang
 # refuses the headers where a source has options of its own that change code.
-option(TWOVIEW_PRECOMPILE "Parse the headers of Eigen once for each target, in release builds too" OFF)
+# tv_precompile(target REUSE_FROM other) takes those of a target with the same flags;
+# tv_precompile(target ALWAYS header...) is for sources that another target compiles without.
+option(TWOVIEW_PRECOMPILE "Parse the headers of Eigen once, in release builds too" OFF)
 mark_as_advanced(TWOVIEW_PRECOMPILE)
 function(tv_precompile target)
-  if((CMAKE_BUILD_TYPE STREQUAL "Debug" OR TWOVIEW_PRECOMPILE) AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
-    list(TRANSFORM ARGN REPLACE "^(.+)$" "$<$<COMPILE_LANGUAGE:CXX>:<\\1$<ANGLE-R>>"
-      OUTPUT_VARIABLE headers)
-    target_precompile_headers(${target} PRIVATE ${headers})
+  cmake_parse_arguments(PARSE_ARGV 1 arg "ALWAYS" "REUSE_FROM" "")
+  if(CMAKE_CXX_COMPILER_LAUNCHER OR
+     NOT (CMAKE_BUILD_TYPE STREQUAL "Debug" OR TWOVIEW_PRECOMPILE OR arg_ALWAYS))
+    return()
   endif()
+  if(arg_REUSE_FROM)
+    target_precompile_headers(${target} REUSE_FROM ${arg_REUSE_FROM})
+    return()
+  endif()
+  list(TRANSFORM arg_UNPARSED_ARGUMENTS REPLACE "^(.+)$" "$<$<COMPILE_LANGUAGE:CXX>:<\\1$<ANGLE-R>>"
+    OUTPUT_VARIABLE headers)
+  target_precompile_headers(${target} PRIVATE ${headers})
 endfunction()

@@ -7,6 +7,7 @@
 #include "robust/covariance.h"
 #include "support/calls.h"
 #include "support/estimator.h"
+#include "support/sanitized.h"
 #include "support/scene.h"
 #include "twoview/two_view.h"
 
@@ -17,7 +18,7 @@ using tv::Mat3;
 using tv::Vec2;
 using tv::Vec3;
 
-constexpr int kCapMatches = 4000;
+constexpr int kCapMatches = 4000, kTrials = kSanitized ? 2 : 20;
 tv_context* context;
 scene::Scene pair;
 uint8_t mask[kCapMatches];
@@ -86,7 +87,7 @@ void test_config_names_the_kind_of_pair(void) {
   for (int calibrated = 0; calibrated < 2; ++calibrated) {
     for (int k = 0; k < 5; ++k) {
       int right = 0;
-      for (int trial = 0; trial < 20; ++trial) {
+      for (int trial = 0; trial < kTrials; ++trial) {
         scene::Options options =
             options_of(kinds[k], 300, trial % 2 == 0 ? 0.6 : 0.9, 20 * k + trial);
         options.noise_px = trial % 4 < 2 ? 0.2 : 0.5;
@@ -95,7 +96,7 @@ void test_config_names_the_kind_of_pair(void) {
             calibrated == 1, calibrated == 1 ? TV_SOLVER_FIVE_POINT : TV_SOLVER_SEVEN_POINT);
         right += r.kind == configs[calibrated][k];
       }
-      TEST_ASSERT_GREATER_OR_EQUAL_INT(18, right);
+      TEST_ASSERT_TRUE(kSanitized || 10 * right >= 9 * kTrials);
     }
   }
 }
@@ -203,7 +204,7 @@ void test_degenerate_points_end_and_give_no_pose(void) {
 void test_covariance_covers_the_error(void) {
   using Mat5 = Eigen::Matrix<double, 5, 5, Eigen::RowMajor>;
   int inside = 0, total = 0;
-  for (int trial = 0; trial < 60; ++trial) {
+  for (int trial = 0; trial < 3 * kTrials; ++trial) {
     scene::Options options = options_of(Kind::kGeneral, 200, 1, 600 + trial);
     options.noise_px = 0.3;
     scene::make(options, &pair);
@@ -221,6 +222,7 @@ void test_covariance_covers_the_error(void) {
     inside += e.dot(information * e) < 9.236;  // 90 per cent quantile of chi-square with 5 dof
     ++total;
   }
+  if (kSanitized) return;
   TEST_ASSERT_GREATER_THAN_INT(50, total);
   TEST_ASSERT_GREATER_THAN_INT(7 * total / 10, inside);
 }
@@ -230,7 +232,7 @@ void test_covariance_covers_the_error(void) {
 // decides, not that of the noise alone. Above 13.5 degrees the parallax is low.
 void test_a_direction_that_is_stated_to_be_uncertain_is_low_parallax(void) {
   int uncertain = 0;
-  for (int trial = 0; trial < 150; ++trial) {
+  for (int trial = 0; trial < (kSanitized ? 15 : 150); ++trial) {
     scene::Options options = options_of(Kind::kGeneral, 200, 0.2, 800 + trial);
     options.noise_px = 0.1;
     scene::make(options, &pair);
@@ -247,7 +249,7 @@ void test_a_direction_that_is_stated_to_be_uncertain_is_low_parallax(void) {
     TEST_ASSERT_TRUE((r.reasons & TV_REASON_LOW_PARALLAX) != 0);
     ++uncertain;
   }
-  TEST_ASSERT_GREATER_OR_EQUAL_INT(5, uncertain);
+  TEST_ASSERT_TRUE(kSanitized || uncertain >= 5);
 }
 
 // Posts that stand a period apart in rows along x, and the camera moves along the rows. Puts count

@@ -490,7 +490,8 @@ Map infer(tv_room* room, const Map& m, const Planes& planes, int32_t* num) {
 void test_plain_walls_are_found_by_their_edges_and_inferred_between() {
   const Scene scene = hall();
   const tv_camera camera = box_room::pinhole(240, 180, 170);
-  std::vector<Map> maps = tour(scene, camera, 24, 0.02f), inferred(24);
+  const std::vector<Map> truths = tour(scene, camera, 24, 0.02f);
+  std::vector<Map> maps = truths, inferred(24);
   tv_room* room = new_room();
   for (size_t k = 0; k < maps.size(); ++k) {
     make_plain(scene, &maps[k], k + 1);
@@ -517,7 +518,7 @@ void test_plain_walls_are_found_by_their_edges_and_inferred_between() {
   for (size_t k = 0; k < maps.size(); ++k) {
     int32_t num;
     inferred[k] = infer(room, maps[k], planes, &num);
-    const Map truth = tour(scene, camera, 24, 0.02f)[k];
+    const Map& truth = truths[k];
     for (size_t i = 0; i < truth.distance.size(); ++i) {
       if (inferred[k].distance[i] == 0) continue;
       TEST_ASSERT_TRUE(maps[k].distance[i] == 0 && inferred[k].sigma[i] > 0);
