@@ -109,6 +109,16 @@ void test_a_camera_that_is_assumed_is_contradicted_by_any_misfit(void) {
   assert_reason(TV_REASON_CAMERA_CONTRADICTED, e);
 }
 
+void test_a_focal_length_that_is_open_by_more_than_an_eighth_is_doubtful(void) {
+  Evidence e = good();
+  e.focal_sigma = 0.124;
+  assert_reason(0, e);
+  e.focal_sigma = 0.126;
+  assert_reason(TV_REASON_LOW_PARALLAX, e);
+  e.kind = TV_KIND_PLANAR;
+  assert_reason(TV_REASON_LOW_PARALLAX, e);
+}
+
 void test_no_rung_mends_the_cameras(void) {
   tv_two_view pose = {};
   pose.num_places = 20;
@@ -404,6 +414,7 @@ int main(void) {
   RUN_TEST(test_inliers_are_crowded_where_they_are_in_both_images_or_on_a_line_in_one);
   RUN_TEST(test_a_camera_is_contradicted_where_the_direction_would_be_another_one);
   RUN_TEST(test_a_camera_that_is_assumed_is_contradicted_by_any_misfit);
+  RUN_TEST(test_a_focal_length_that_is_open_by_more_than_an_eighth_is_doubtful);
   RUN_TEST(test_no_rung_mends_the_cameras);
   RUN_TEST(test_a_rotation_that_hangs_on_one_region_is_doubtful);
   RUN_TEST(test_a_second_model_is_a_motion_or_a_lattice_and_the_opposite_motion_a_repetition);

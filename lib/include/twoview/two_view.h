@@ -100,7 +100,8 @@ typedef enum tv_reason {
   /* The direction of t is poorly determined: the median parallax is below 3 max_error_px or below
      10 times the noise, or the largest standard deviation of the pose exceeds 1.25 degrees by the
      noise alone, or that of the direction 13.5 degrees with the errors that matches share. With two
-     cameras of uncertain focal length (above 0.02), with all that the covariance states. */
+     cameras of uncertain focal length (above 0.02), with all that the covariance states. Or the
+     relative standard deviation that is left of the focal length exceeds 0.125. */
   TV_REASON_LOW_PARALLAX = 1 << 2,
   /* The matches lie on a plane, and two different poses explain them equally well. Both are in the
      result. */

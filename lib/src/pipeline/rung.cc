@@ -97,9 +97,12 @@ void judge_attempt(tv_context* context, const PairTask& task, PairArrays& arrays
   evidence.looks_repeated =
       looks_repeated(task.match, arrays.matches, arrays.inlier_mask, attempt->num_matches);
   // To match mirrored pictures takes time, and where something is against the pair already, it adds
-  // nothing. Where a quarter of the keypoints match, the pictures are not mirrored.
+  // nothing. Where a quarter of the keypoints match, the pictures are not mirrored. A focal length
+  // that is not known is nothing against the pair.
+  Evidence of_pair = evidence;
+  of_pair.focal_sigma = 0;
   evidence.looks_mirrored = 4 * attempt->num_matches < num_keypoints &&
-                            judge(evidence).verdict == TV_VERDICT_OK &&
+                            judge(of_pair).verdict == TV_VERDICT_OK &&
                             looks_mirrored(context, task, *attempt, arrays);
   write_judgement(judge(evidence), &attempt->estimate);
 }

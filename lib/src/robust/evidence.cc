@@ -270,8 +270,10 @@ void measure_inliers(Fit& f) {
   evidence.num_different = matches.num_unique();
   evidence.threshold_px = f.threshold;
   evidence.num_trials = f.problem.options.num_trials;
-  evidence.is_camera_assumed =
-      std::max(f.problem.options.focal_sigma0, f.problem.options.focal_sigma1) > kUncertainFocal;
+  const double focal_sigma =
+      std::max(f.problem.options.focal_sigma0, f.problem.options.focal_sigma1);
+  evidence.is_camera_assumed = focal_sigma > kUncertainFocal;
+  evidence.focal_sigma = f.problem.one_camera ? out.focal_sigma : focal_sigma;
   for (int v = 0; v < 2; ++v) measure_spread(f, v, evidence);
   evidence.agreement = agreement_of(f);
 }

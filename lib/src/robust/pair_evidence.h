@@ -44,6 +44,9 @@ struct Evidence : Support {
   // they do not contradict the given ones (camera_misfit.h).
   double misfit_direction_rad = 0;
   bool is_camera_assumed = false;  // its focal length is uncertain: nobody calibrated it
+  // The relative standard deviation that is left of the focal length, of two cameras the larger
+  // one.
+  double focal_sigma = 0;
   double median_parallax_rad = 0;  // median parallax of the inliers
   double pixel_angle_rad = 0;      // the parallax that a pixel of noise in both images makes
   // By how much the rotation turns when the inliers of one region are left out; at most kPi.

@@ -51,12 +51,17 @@ bool has_few_cells(double coverage) { return coverage < 4.5 / 64; }
 // errors that matches share, is above 13.5 degrees: by its own covariance it is then about as
 // likely as not off by more than 10 degrees (46 per cent where the error has one axis, 58 where it
 // has none; docs/decisions/0007-verdict-and-covariance.md).
+//
+// Or the focal length is open by more than an eighth, and with it the shape of all that is computed
+// from the pose: a data sheet leaves 0.1, and a pair at least 0.15 of one of which nothing was
+// known (0.5; final_pose.cc, kFocalFloor).
 bool low_parallax(const Evidence& e) {
   constexpr double kMostDirectionSigma = 13.5 * kPi / 180;
+  constexpr double kMostFocalSigma = 0.125;
   const double least_px = std::max(3 * e.threshold_px, 10 * e.noise_px);
   return has_full_pose(e) &&
          (e.median_parallax_rad < least_px * e.pixel_angle_rad || !(e.sigma_rad <= kMostSigma) ||
-          !(e.direction_sigma_rad <= kMostDirectionSigma));
+          !(e.direction_sigma_rad <= kMostDirectionSigma) || e.focal_sigma > kMostFocalSigma);
 }
 
 // CROWDED_MATCHES: the inliers lie in at most 4 of the 64 cells of a grid on each of the two

@@ -93,15 +93,6 @@ void estimate_unknown_cameras(Arguments& a, const Picture pictures[2], ImageCame
                 "--camera is better");
 }
 
-// Says in the result what was estimated. A pair leaves at least 15 per cent of the focal length
-// open, so that its pose and the shape of its cloud are doubtful, whatever else there is.
-void judge_estimated_focal_length(Outcome& outcome) {
-  tv_two_view& v = outcome.two_view;
-  if (!has_full_pose(v)) return;
-  v.reasons |= TV_REASON_LOW_PARALLAX;  // its words are those of the focal length then
-  if (v.verdict == TV_VERDICT_OK) v.verdict = TV_VERDICT_DOUBTFUL;
-}
-
 // The keys that say the focal length itself.
 void add_estimated_focal_length(const Outcome& outcome, nlohmann::ordered_json& json) {
   const tv_two_view& v = outcome.two_view;
@@ -470,7 +461,6 @@ int reconstruct(Arguments& a) {
 #endif
   if (recording) recording->add_scale(outcome);
 
-  if (outcome.estimates_focal_length) judge_estimated_focal_length(outcome);
   outcome.json = result_json(outcome);
   if (outcome.estimates_focal_length) add_estimated_focal_length(outcome, outcome.json);
   if (recording) recording->add_json(outcome);
