@@ -472,6 +472,39 @@ class RoomTest(CliTest):
                 done = self.room("--poses", poses, folder=self.source, out=other)
                 self.assert_refused(done, "the pictures contradict", words, out=other)
 
+    def test_poses_of_other_frames_and_another_focal_length_are_refused(self):
+        data = Path(os.environ.get("TWOVIEW_DATA") or ROOT.parent / "shared/data") / "seq_tsukuba"
+        if not data.is_dir():
+            self.skipTest(f"no {data}")
+        some = self.folder / "some"
+        some.mkdir()
+        (some / "images").symlink_to(data / "images")
+        lines = (data / "frames.txt").read_text().splitlines()[40:58]
+        self.write("some/frames.txt", "\n".join(lines) + "\n")
+        camera = (data / "cameras.yaml").read_text()
+        self.write("some/cameras.yaml", camera.replace("615", "492"))
+        truth = (data / "groundtruth.txt").read_text().splitlines()[40:60]
+        times, places = zip(*(line.split(" ", 1) for line in truth))
+        late = "".join(f"{t} {p}\n" for t, p in zip(times[1:], places))
+        other = self.folder / "other"
+        done = self.room("--poses", data / "groundtruth.txt", folder=some, out=other)
+        self.assert_refused(done, "the pictures contradict", "times the camera's focal length",
+                            out=other)
+        self.assertRegex(done.stderr.decode(), r"about 1\.2\d times")
+        self.write("some/cameras.yaml", camera)
+        done = self.room("--poses", self.write("late.txt", late), folder=some, out=other)
+        self.assert_refused(done, "the pictures contradict", "as those of the frame after",
+                            out=other)
+
+    def test_pictures_of_another_flight_are_refused(self):
+        other = self.folder / "other"
+        shutil.copytree(self.source, other)
+        names = sorted(os.listdir(other / "images"))
+        lines = [f"{t:.9f} images/{name}\n" for t, name in zip(TIMES, names[::-1])]
+        self.write("other/frames.txt", "".join(lines))
+        self.assert_refused(self.room("--source", other), "flight/trajectory.txt",
+                            "the pictures contradict", "Are these the pictures from which")
+
     def test_a_model_of_colmap_and_its_pictures_serve_as_well(self):
         model = self.folder / "model"
         shutil.copytree(self.flight / "colmap", model)

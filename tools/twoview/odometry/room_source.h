@@ -24,7 +24,7 @@ struct RoomSource {
   std::string given;            // as the user or result.json names it
   std::string truth_file;       // of true poses, that result.json names; empty: none
   bool has_true_poses = false;  // the poses are given ones, which a truth is in the frame of
-  std::string poses_file;       // of given poses
+  std::string poses_file;       // that the poses are of
   TruePoses::Order quaternion_order = TruePoses::Order::kKnown;  // of that file
   std::vector<std::string> files;  // that were read, which no output may replace
   std::vector<std::string> notes;
@@ -46,9 +46,11 @@ RoomSource room_source_of_colmap(const std::string& model, const std::string& pi
 // The true poses of the source's frames: of `file`, else those that the source knows, else none.
 TruePath true_path(const RoomSource& from, const std::string& file);
 
-// Finds points for a scene without any, by matching its pictures. Throws BadInput where the
-// pictures contradict its poses, and says as what they would fit.
-void add_posed_points(RoomSource& from, const std::atomic<bool>& stop);
+// Matches pictures of the scene's views, from first_view on and at most most_pictures of them.
+// Throws BadInput where they contradict its poses, and says as what these would fit. Finds points
+// for a scene without any.
+void add_posed_points(RoomSource& from, size_t first_view, size_t most_pictures,
+                      const std::atomic<bool>& stop);
 
 // The scene of a flight that has just ended: its longest segment.
 RoomScene room_scene(const FlightResult& result);

@@ -41,15 +41,25 @@ std::string summary(const RoomSource& from, const RoomModel& model, const Output
                              model.depth_maps.empty() ? "" : " depth/");
 }
 
+// The source, once its pictures are found to agree with its poses. Those of a flight were made from
+// them: a dozen pictures from its first third on show whether it is still the same source.
+RoomSource confirmed(RoomSource from, bool is_flight, const std::atomic<bool>& stop,
+                     const Arguments& a) {
+  constexpr size_t kOfFlight = 12;
+  const Stopwatch watch(!a.common.quiet, "room: matching pictures against the poses");
+  if (is_flight)
+    add_posed_points(from, from.scene.views.size() / 3, kOfFlight, stop);
+  else
+    add_posed_points(from, 0, from.scene.views.size(), stop);
+  return from;
+}
+
 // What FOLDER is: frames whose poses --poses gives, a model of COLMAP, or a flight's results.
 RoomSource source_of(const Arguments& a, const std::atomic<bool>& stop) {
   if (!a.poses.empty()) {
     if (!a.source.empty())
       throw BadInput("--source is for the results of twoview odometry and models of COLMAP");
-    RoomSource from = room_source_of_poses(a.folder, a.poses, a.camera, a.fps);
-    const Stopwatch watch(!a.common.quiet, "room: matching pictures for the range of depth");
-    add_posed_points(from, stop);
-    return from;
+    return confirmed(room_source_of_poses(a.folder, a.poses, a.camera, a.fps), false, stop, a);
   }
   if (!a.camera.empty() || a.fps > 0) throw BadInput("--camera and --fps are for --poses");
   std::error_code error;
@@ -58,7 +68,7 @@ RoomSource source_of(const Arguments& a, const std::atomic<bool>& stop) {
   if (!is_flight && std::filesystem::exists(folder / "images.txt", error)) {
     if (a.source.empty())
       throw BadInput("--source is required: the folder of the pictures of the model " + a.folder);
-    return room_source_of_colmap(a.folder, a.source);
+    return confirmed(room_source_of_colmap(a.folder, a.source), false, stop, a);
   }
   if (!is_flight && std::filesystem::exists(folder / "images.bin", error))
     throw BadInput(a.folder +
@@ -67,7 +77,7 @@ RoomSource source_of(const Arguments& a, const std::atomic<bool>& stop) {
   if (!is_flight && std::filesystem::exists(folder / "frames.txt", error))
     throw BadInput("--poses is required: " + a.folder +
                    " holds frames without poses (or run twoview odometry first)");
-  return room_source_of_flight(a.folder, a.source);
+  return confirmed(room_source_of_flight(a.folder, a.source), true, stop, a);
 }
 
 int room(Arguments& a) {

@@ -13,6 +13,7 @@ constexpr size_t kMostViews = 60;
 // A view is matched with those so many before it: near ones see the same, far ones from elsewhere.
 constexpr size_t kBack[] = {1, 2, 4, 8};
 constexpr float kLeastAngle = 0.03f;  // radians between the rays: 1.7 degrees
+constexpr size_t kFewestPairs = 3;    // of pictures that confirm each other
 constexpr float kMostError = 1.5f;    // pixels: a wrong match seldom lies so near its epipolar line
 
 }  // namespace
@@ -54,8 +55,8 @@ PosedPoints::Pairs PosedPoints::matched(const Seen& first, const Seen& second) {
 
 // The points of these matches by two poses world_from_cam, in the first camera's frame; none where
 // the poses are at one place.
-std::vector<tv_point> PosedPoints::points_of(const Pairs& pairs, const Matrix3 R[2],
-                                             const Vector3 t[2]) const {
+std::vector<tv_point> PosedPoints::points_of(const tv_camera& camera, const Pairs& pairs,
+                                             const Matrix3 R[2], const Vector3 t[2]) const {
   const Matrix3 cam1_from_world = transposed(R[1]);
   const Matrix3 rotation = product(cam1_from_world, R[0]);
   Vector3 way;
@@ -63,7 +64,7 @@ std::vector<tv_point> PosedPoints::points_of(const Pairs& pairs, const Matrix3 R
   const Vector3 translation = applied(cam1_from_world, way);
   if (!(norm(translation) > 0)) return {};
   std::vector<tv_point> points(pairs.size());
-  const tv_camera_pair cameras = camera_pair(scene_.camera, scene_.camera, rotation, translation);
+  const tv_camera_pair cameras = camera_pair(camera, camera, rotation, translation);
   const tv_pixel_pairs pixels = pixel_pairs(pairs.pixels);
   check(tv_triangulate(&cameras, &pixels, TV_TRIANGULATION_ITERATIVE_LS, points.data()),
         "cannot triangulate " + scene_.views[pairs.views[0]].name + " and " +
@@ -75,7 +76,7 @@ void PosedPoints::triangulate(const Pairs& pairs) {
   const RoomView &v0 = scene_.views[pairs.views[0]], &v1 = scene_.views[pairs.views[1]];
   const Matrix3 R[2] = {v0.R, v1.R};
   const Vector3 t[2] = {v0.t, v1.t};
-  for (const tv_point& point : points_of(pairs, R, t)) {
+  for (const tv_point& point : points_of(scene_.camera, pairs, R, t)) {
     if (point.status != TV_POINT_OK || point.angle_rad < kLeastAngle || point.error_px > kMostError)
       continue;
     Vector3 world = applied(v0.R, {point.position[0], point.position[1], point.position[2]});
@@ -103,7 +104,6 @@ void PosedPoints::confirm(const Pairs& pairs) {
 
 std::optional<double> PosedPoints::share_that_fits(const std::vector<Matrix3>& R,
                                                    const std::vector<Vector3>& t) const {
-  constexpr size_t kFewestPairs = 3;
   // Errors of poses shift what they put by a few pixels; what moves less than ten times that tells
   // nothing else.
   constexpr double kLeast = 1.5, kOfMotion = 0.1, kOfWidth = 0.01;
@@ -111,7 +111,7 @@ std::optional<double> PosedPoints::share_that_fits(const std::vector<Matrix3>& R
   for (const Pairs& pairs : confirmed_) {
     const Matrix3 rotations[2] = {R[pairs.views[0]], R[pairs.views[1]]};
     const Vector3 places[2] = {t[pairs.views[0]], t[pairs.views[1]]};
-    const std::vector<tv_point> points = points_of(pairs, rotations, places);
+    const std::vector<tv_point> points = points_of(scene_.camera, pairs, rotations, places);
     num_pairs += !points.empty();
     count += points.size();
     double sum_sq = 0;
@@ -128,6 +128,36 @@ std::optional<double> PosedPoints::share_that_fits(const std::vector<Matrix3>& R
   }
   if (num_pairs < kFewestPairs) return {};
   return static_cast<double>(fitting) / static_cast<double>(count);
+}
+
+std::optional<double> PosedPoints::median_error_px(const std::vector<Matrix3>& R,
+                                                   const std::vector<Vector3>& t,
+                                                   double focal) const {
+  constexpr size_t kOfPair = 50;  // a median needs no more matches of two pictures
+  tv_camera camera = scene_.camera;
+  camera.fx *= focal;
+  camera.fy *= focal;
+  size_t num_pairs = 0;
+  std::vector<double> errors;
+  for (const Pairs& pairs : confirmed_) {
+    Pairs some{{pairs.views[0], pairs.views[1]}, {}};
+    for (size_t i = 0; i < pairs.size(); i += pairs.size() / kOfPair + 1)
+      for (size_t v = 0; v < 2; ++v)
+        some.pixels[v].insert(some.pixels[v].end(),
+                              {pairs.pixels[v][2 * i], pairs.pixels[v][2 * i + 1]});
+    const Matrix3 rotations[2] = {R[some.views[0]], R[some.views[1]]};
+    const Vector3 places[2] = {t[some.views[0]], t[some.views[1]]};
+    const std::vector<tv_point> points = points_of(camera, some, rotations, places);
+    num_pairs += !points.empty();
+    for (const tv_point& point : points) {
+      const bool is_seen = point.status == TV_POINT_OK || point.status == TV_POINT_INFINITE;
+      errors.push_back(is_seen ? double(point.error_px) : scene_.camera.width);
+    }
+  }
+  if (num_pairs < kFewestPairs) return {};
+  const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
+  std::nth_element(errors.begin(), middle, errors.end());
+  return *middle;
 }
 
 }  // namespace cli

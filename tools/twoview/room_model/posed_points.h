@@ -28,6 +28,11 @@ class PosedPoints {
   std::optional<double> share_that_fits(const std::vector<Matrix3>& R,
                                         const std::vector<Vector3>& t) const;
 
+  // By how many pixels such poses, and a camera whose focal length is `focal` times the scene's,
+  // miss these matches in the median (the triangulated points' errors). Empty as above.
+  std::optional<double> median_error_px(const std::vector<Matrix3>& R,
+                                        const std::vector<Vector3>& t, double focal) const;
+
  private:
   struct Seen {
     size_t view;
@@ -40,7 +45,8 @@ class PosedPoints {
     size_t size() const { return pixels[0].size() / 2; }
   };
   Pairs matched(const Seen& first, const Seen& second);
-  std::vector<tv_point> points_of(const Pairs& pairs, const Matrix3 R[2], const Vector3 t[2]) const;
+  std::vector<tv_point> points_of(const tv_camera& camera, const Pairs& pairs, const Matrix3 R[2],
+                                  const Vector3 t[2]) const;
   void triangulate(const Pairs& pairs);
   void confirm(const Pairs& pairs);
 
