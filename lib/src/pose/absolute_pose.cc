@@ -10,6 +10,7 @@
 #include "robust/gravity.h"
 #include "robust/ldlt.h"
 #include "robust/loop.h"
+#include "robust/m_estimate.h"
 #include "robust/verdict.h"
 
 namespace tv {
@@ -25,14 +26,6 @@ constexpr double kScales[] = {6, 4, 3, 2, 1.5, 1};
 constexpr double kClearly = 2;
 // kVariance: the variance of the estimate over that of least squares at kScale, for normal noise.
 constexpr double kScale = 4, kVariance = 1.0563871016563298;
-constexpr double kLeastScale = 0.02;  // in thresholds: exact matches come from an inexact camera
-constexpr int kFinalRounds = 2, kFinalIterations = 20;
-constexpr double kFinalGains[kFinalRounds] = {1e-3, 1e-6};
-
-// Twice the logarithm of a thousand: evidence against a pose at a significance of 0.001.
-constexpr double kEvidence = 13.815510557964274;
-// Chi-square of two degrees of freedom at 99 per cent, up to which gravity agrees with the matches.
-constexpr double kAgreementSq = 9.21;
 
 struct Finish {
   const SightingInput& input;
@@ -58,7 +51,7 @@ struct Candidate {
 bool covariance_of(const Candidate& c, const GravitySight& gravity, double covariance[36]) {
   double upper[21];
   for (int k = 0; k < 21; ++k) upper[k] = c.equations.upper[k] / c.variance_px;
-  add_gravity(c.pose.R * gravity.in_world, gravity.weight, upper);
+  add_turn_information(c.pose.R * gravity.in_world, gravity.weight, 6, upper);
   return invert_symmetric(6, upper, covariance) && all_finite(covariance, 36);
 }
 
@@ -91,13 +84,13 @@ double gravity_distance_sq(const Candidate& c, const GravitySight& gravity) {
 // The variance of the estimate by Huber's formula (robust/covariance.h), for residuals of two
 // dimensions. False where the matches are too few for it.
 bool set_variance(const Finish& f, Candidate* c) {
-  const PoseEquations& e = c->equations;
-  const int n = e.visible, left = 2 * n - 6;
-  const double mean = e.slope / n, weight = e.weight / n;
+  const LossSums& sums = c->equations.sums;
+  const int n = c->equations.visible, left = 2 * n - 6;
+  const double mean = sums.slope / n, weight = sums.weight / n;
   if (left <= 4 || !(mean > 0.05)) return false;
-  const double K = 1 + 6.0 / (2 * n) * (e.slope_sq / n - mean * mean) / (mean * mean);
+  const double K = small_sample_factor(sums, n, 2, 6, mean);
   const double least = 0.05 * kLeastScale * f.threshold_px;
-  const double uncorrected = std::max(e.psi_sq / left / (mean * mean), least * least);
+  const double uncorrected = std::max(sums.psi_sq / left / (mean * mean), least * least);
   c->noise_px = std::sqrt(uncorrected / kVariance);
   // The noise is itself estimated, from `left` degrees of freedom: with this factor the ellipsoid
   // at 95 per cent is that of the F distribution, within 3 % for 14 and more.
@@ -144,7 +137,8 @@ Candidate refined(const Finish& f, const Pose* start) {
     refine_absolute(problem, kFinalIterations, kFinalGains[round], &c.pose, &c.equations);
   }
   const double scale_px = problem.scale_px;
-  problem.noise_sq = c.equations.slope > 0 ? c.equations.psi_sq / (2 * c.equations.slope) : 0;
+  const LossSums& sums = c.equations.sums;
+  problem.noise_sq = sums.slope > 0 ? sums.psi_sq / (2 * sums.slope) : 0;
   problem.scale_px = std::max(kScale * c.noise_px, kLeastScale * f.threshold_px);
   c.scale_px = problem.scale_px;
   pose_equations(problem, c.pose, &c.equations);
@@ -155,10 +149,8 @@ Candidate refined(const Finish& f, const Pose* start) {
   gravity = f.gravity;
   if (!(gravity.weight > 0)) return c;
   if (c.determined) {
-    // Gravity that contradicts the matches counts less (robust/gravity.h).
     const double z_sq = gravity_distance_sq(c, gravity);
-    const double ratio = z_sq > kAgreementSq ? kAgreementSq / z_sq : 1;
-    gravity.weight *= ratio * ratio;
+    gravity.weight *= gravity_weight(z_sq);
     c.gravity_sq = std::min(z_sq, 2 * kEvidence);
   }
   problem.scale_px = scale_px;

@@ -66,7 +66,6 @@ struct AbsoluteEstimator {
 double chance_of_sighting(const SightingInput& input, const Sightings& s, const Pose& pose,
                           double threshold_px, uint64_t seed) {
   constexpr int kPairings = 512;
-  constexpr double kPriorWeight = 100;
   const int n = s.num;
   if (n < 2) return 1;
   double sigmas_sq = 0;
@@ -80,14 +79,12 @@ double chance_of_sighting(const SightingInput& input, const Sightings& s, const 
   Random random = random_seeded(seed);
   int agreeing = 0;
   for (int k = 0; k < kPairings; ++k) {
-    const uint32_t i = random_below(random, static_cast<uint32_t>(n));
-    const uint32_t j = random_below(random, static_cast<uint32_t>(n - 1));
-    Sighting wrong = s.all[j + (j >= i)];
-    std::copy_n(s.all[i].point, 3, wrong.point);
+    const WrongMatch drawn = draw_wrong_match(random, n);
+    Sighting wrong = s.all[drawn.second];
+    std::copy_n(s.all[drawn.first].point, 3, wrong.point);
     agreeing += reprojection_sq(wrong, pose) <= threshold_px * threshold_px;
   }
-  const double weight = std::min(0.5 * n * (n - 1.0), double(kPairings));
-  return (weight * agreeing / kPairings + kPriorWeight * prior) / (weight + kPriorWeight);
+  return chance_from_pairings(agreeing, kPairings, kPairings, n, prior);
 }
 
 }  // namespace

@@ -4,13 +4,13 @@
 #include <cmath>
 #include <cstddef>
 
+#include "robust/gravity.h"
 #include "robust/ldlt.h"
 
 namespace tv {
 namespace {
 
 constexpr double kInfinity = __builtin_inf();
-constexpr double kMostStretch = 1.5;
 
 // Two doubles; each operation is the IEEE operation on both.
 typedef double Doubles __attribute__((vector_size(16)));
@@ -85,12 +85,6 @@ double reprojection_sq(const Sighting& s, const Pose& pose) {
   return error_sq == error_sq ? error_sq : kInfinity;
 }
 
-void add_gravity(const Vec3& h, double weight, double upper[21]) {
-  for (int a = 0, slot = 0; a < 3; ++a, slot += 3) {
-    for (int b = a; b < 3; ++b) upper[slot++] += weight * ((a == b ? 1.0 : 0.0) - h[a] * h[b]);
-  }
-}
-
 void pose_equations(const PoseProblem& problem, const Pose& pose, PoseEquations* e) {
   *e = PoseEquations{};
   const double inverse_sq = 1 / (problem.scale_px * problem.scale_px);
@@ -109,10 +103,10 @@ void pose_equations(const PoseProblem& problem, const Pose& pose, PoseEquations*
     const double q = error_sq * inverse_sq, share = 1 / (1 + q), weight = share * share;
     const double slope = weight * (1 - q) * share;
     e->cost += q * share;
-    e->weight += weight;
-    e->psi_sq += error_sq * weight * weight;
-    e->slope += slope;
-    e->slope_sq += slope * slope;
+    e->sums.weight += weight;
+    e->sums.psi_sq += error_sq * weight * weight;
+    e->sums.slope += slope;
+    e->sums.slope_sq += slope * slope;
     e->visible += 1;
     // Both rows at once, one in each lane.
     Doubles row[6];
@@ -137,7 +131,7 @@ void pose_equations(const PoseProblem& problem, const Pose& pose, PoseEquations*
   const Vec3 h = pose.R * problem.gravity.in_world;
   const Vec3 slope = problem.gravity.in_camera.cross(h);
   const double weight = problem.noise_sq * problem.gravity.weight;
-  add_gravity(h, weight, e->upper);
+  add_turn_information(h, weight, 6, e->upper);
   for (int a = 0; a < 3; ++a) e->gradient[a] += weight * slope[a];
   e->cost += weight * inverse_sq * (h - problem.gravity.in_camera).squaredNorm();
 }
@@ -146,30 +140,26 @@ void refine_absolute(const PoseProblem& problem, int max_iterations, double smal
                      PoseEquations* equations) {
   PoseEquations of[2];
   int current = 0;
-  double lambda = 1e-4;
+  Damping damping;
   pose_equations(problem, *pose, &of[0]);
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     const PoseEquations& now = of[current];
     double step[6];
-    if (!solve_damped(6, now.upper, now.gradient, lambda, step)) break;
-    // Reweighted least squares take the weight for the curvature of the loss, psi', so that their
-    // steps are too short (robust/refine.h).
-    const double most = kMostStretch * now.slope;
-    const double stretch = now.weight < most ? now.weight / now.slope : kMostStretch;
+    if (!solve_damped(6, now.upper, now.gradient, damping.lambda, step)) break;
+    const double stretch = stretch_of(now.sums.weight, now.sums.slope);
     for (double& x : step) x *= stretch;
     const Pose moved{orthonormal_product(rotation_step(Vec3(step[0], step[1], step[2])), pose->R),
                      pose->t + Vec3(step[3], step[4], step[5])};
     PoseEquations& next = of[1 - current];
     pose_equations(problem, moved, &next);
     if (!(next.cost < now.cost)) {
-      lambda *= 10;
-      if (lambda > 1e6) break;
+      if (!damping.tighten()) break;
       continue;
     }
     const double gain = now.cost - next.cost;
     *pose = moved;
     current = 1 - current;
-    lambda = std::max(0.1 * lambda, 1e-10);
+    damping.ease();
     if (gain < small_gain * next.cost) break;
   }
   if (equations != nullptr) *equations = of[current];

@@ -4,6 +4,7 @@
 
 #include "geometry/vector3.h"
 #include "pose/sightings.h"
+#include "robust/m_estimate.h"
 
 namespace tv {
 
@@ -30,10 +31,6 @@ struct GravitySight {
   Vec3 in_world = Vec3::Zero(), in_camera = Vec3::Zero();
 };
 
-// Adds the information of gravity to the upper triangle of that of a pose. A turn by w moves
-// h = R in_world by w x h, so that J' J = I - h h' (see robust/gravity.cc).
-void add_gravity(const Vec3& h, double weight, double upper[21]);
-
 // What the normal equations are of: the robust loss sum q / (1 + q) with q = |e|^2 / scale^2 (S.
 // Geman, D. McClure, 1987) over the listed matches, and the prior of gravity, whose term is
 // noise_sq weight |R in_world - in_camera|^2 / scale^2.
@@ -51,9 +48,9 @@ struct PoseProblem {
 struct PoseEquations {
   double upper[21], gradient[6];
   double cost;
-  // For the variance of the estimate: sums over the matches of the weight, of psi^2, of psi' and of
-  // psi'^2, where psi = e / (1 + q)^2, and psi' is half its divergence; and how many are visible.
-  double weight, psi_sq, slope, slope_sq;
+  // For the variance of the estimate: psi = e / (1 + q)^2, and psi' is half its divergence; and how
+  // many matches are visible.
+  LossSums sums;
   int visible;
 };
 void pose_equations(const PoseProblem& problem, const Pose& pose, PoseEquations* equations);

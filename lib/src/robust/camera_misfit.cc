@@ -6,6 +6,7 @@
 #include "base/math.h"
 #include "geometry/sampson.h"
 #include "robust/ldlt.h"
+#include "robust/m_estimate.h"
 
 namespace tv {
 namespace {
@@ -23,7 +24,6 @@ constexpr double kCentreSigma = 0.01;
 constexpr double kShare = 4, kLeastNoise = 0.05;
 // Chi-square with six and with eight degrees of freedom exceeds this in one pair of a thousand.
 constexpr double kTurnsEvidence = 22.457744, kCameraEvidence = 26.124482;
-constexpr double kMostStretch = 1.5;  // as robust/final_pose.cc
 
 struct Sums {
   double upper[kAll][kAll], gradient[kAll];  // J' W J, of which the upper triangle, and J' W r
@@ -112,11 +112,6 @@ void sum_equations(const PoseRefiner& f, int count, const Pose& pose, const Robu
   sums->psi_sq *= loss.scale_px * loss.scale_px;
 }
 
-// What the loss's weights make a step of the linear equations too short by.
-double stretch_of(const Sums& sums) {
-  return sums.weight < kMostStretch * sums.slope ? sums.weight / sums.slope : kMostStretch;
-}
-
 // The pose's step that goes with the step `asked` of the cameras' parameters.
 void step_of_pose(const double G[kPose][kCamera], const double* asked, int num, double stretch,
                   double step[kPose]) {
@@ -173,7 +168,7 @@ void add_camera_misfit(const PoseRefiner& f, int count, const Pose& pose, const 
   }
   double left_open[kCamera * kCamera];
   if (!invert_symmetric(num, packed, left_open)) return;
-  const double stretch = stretch_of(sums);
+  const double stretch = stretch_of(sums.weight, sums.slope);
   double asked[kCamera], evidence = 0;
   for (int q = 0; q < num; ++q) {
     asked[q] = 0;

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "base/math.h"
-#include "base/random.h"
 #include "geometry/sampson.h"
 
 namespace tv {
@@ -85,10 +84,22 @@ double meaningful_chance(int n, int k, int m, int models) {
              (k - m));
 }
 
+WrongMatch draw_wrong_match(Random& random, int n) {
+  const int first = static_cast<int>(random_below(random, static_cast<uint32_t>(n)));
+  const int other = static_cast<int>(random_below(random, static_cast<uint32_t>(n - 1)));
+  return {first, other + (other >= first)};
+}
+
+double chance_from_pairings(int agreeing, int drawn, int most, int n, double prior) {
+  constexpr double kPriorWeight = 100;
+  const double different = 0.5 * n * (n - 1.0);
+  const double weight = different < most ? different : most;
+  return (weight * agreeing / drawn + kPriorWeight * prior) / (weight + kPriorWeight);
+}
+
 double chance_of_agreement(const Matches& matches, const Mat3& M, double threshold_px,
                            uint64_t seed, double limit) {
   constexpr int kPairings = 1024;
-  constexpr double kPriorWeight = 100;
   const RayPairs& pairs = matches.pairs;
   // The share of the image that a band around a line covers, of half width sqrt(2) T, because
   // Sampson's distance shares the error between the two images. The band's length is taken as the
@@ -103,18 +114,14 @@ double chance_of_agreement(const Matches& matches, const Mat3& M, double thresho
   while (drawn < kPairings && !is_clear(agreeing, drawn, limit)) {
     int listed[2][kChunk];
     for (int k = 0; k < kChunk; ++k) {
-      const int i = static_cast<int>(random_below(random, static_cast<uint32_t>(n)));
-      const int j = static_cast<int>(random_below(random, static_cast<uint32_t>(n - 1)));
-      listed[0][k] = i;
-      listed[1][k] = j + (j >= i);
+      const WrongMatch drawn_match = draw_wrong_match(random, n);
+      listed[0][k] = drawn_match.first;
+      listed[1][k] = drawn_match.second;
     }
     agreeing += wrong.count_agreeing(pairs, listed, M, threshold_px);
     drawn += kChunk;
   }
-  // Few matches have fewer different pairings than were drawn, and count less against the prior.
-  const double different = 0.5 * n * (n - 1.0);
-  const double weight = different < kPairings ? different : kPairings;
-  return (weight * agreeing / drawn + kPriorWeight * prior) / (weight + kPriorWeight);
+  return chance_from_pairings(agreeing, drawn, kPairings, n, prior);
 }
 
 }  // namespace tv

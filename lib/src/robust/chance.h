@@ -2,6 +2,7 @@
 // false alarms, and the probability that a wrong match agrees with an epipolar model.
 #pragma once
 
+#include "base/random.h"
 #include "robust/matches.h"
 
 namespace tv {
@@ -21,6 +22,18 @@ inline constexpr double kLogMeaningful = -4.605170185988091;  // NFA < 0.01
 
 // The probability p at which log_false_alarms is kLogMeaningful; k > m.
 double meaningful_chance(int n, int k, int m, int models);
+
+// Two different ones of n matches, the point of the first paired with that of the second: a wrong
+// match, as long as few matches are equal.
+struct WrongMatch {
+  int first, second;
+};
+WrongMatch draw_wrong_match(Random& random, int n);
+
+// The share of wrong pairings of n matches that agree, averaged with a prior that counts as 100 of
+// them. Few matches have fewer different pairings than were drawn, and count less against it.
+// most: how many may be drawn.
+double chance_from_pairings(int agreeing, int drawn, int most, int n, double prior);
 
 // The probability that a point of view 0, matched with a wrong point of view 1, agrees with M. It
 // is counted over wrong pairings of the matched points, so that it is right for crowded points,

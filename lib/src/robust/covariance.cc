@@ -8,6 +8,7 @@
 #include "geometry/sampson.h"
 #include "geometry/transfer.h"
 #include "robust/ldlt.h"
+#include "robust/m_estimate.h"
 
 namespace tv {
 
@@ -21,11 +22,6 @@ constexpr double kVarianceOfCauchy = 1.1484187788317, kVarianceOnPlane = 1.0919;
 constexpr double kLeastResidual = 0.05;  // least deviation of a residual, in scales of the loss
 constexpr int kChunk = 64;               // matches that are handled at a time, on the stack
 
-// Sums over the matches of psi^2, psi', psi'^2 and the weight.
-struct LossSums {
-  double psi_sq = 0, slope = 0, slope_sq = 0, weight = 0;
-};
-
 // Huber's variance for n residuals of `dimensions` each and p parameters; negative where the mean
 // curvature of the loss is too small. cut_slope: what the mean of psi' loses because matches beyond
 // a limit take no part: 2 psi(limit) times the density of the residuals there.
@@ -33,8 +29,7 @@ double variance_of(const LossSums& sums, int n, int dimensions, int p, double sc
                    double cut_slope) {
   const double mean = sums.slope / n - cut_slope;
   if (!(mean > 0.05)) return -1;
-  const double of_slope = sums.slope_sq / n - mean * mean;
-  const double K = 1 + p / static_cast<double>(dimensions * n) * of_slope / (mean * mean);
+  const double K = small_sample_factor(sums, n, dimensions, p, mean);
   const int left = dimensions * n - p;
   if (left <= 2) return -1;
   // The variance of Student's distribution, since the noise itself is estimated from `left` degrees

@@ -14,6 +14,7 @@
 #include "robust/correlation.h"
 #include "robust/estimators.h"
 #include "robust/ldlt.h"
+#include "robust/m_estimate.h"
 #include "robust/refine.h"
 
 namespace tv {
@@ -38,7 +39,6 @@ constexpr int kParallaxSample = 128;  // matches that the quantile is computed f
 // measurements.
 constexpr double kScales[] = {1, 1.5, 2, 3};
 constexpr double kLargestScale = 2;  // largest scale of the loss, in thresholds
-constexpr double kMostStretch = 1.5;
 
 // The matches' information on the focal length is divided by this: a lens, a rolling shutter and
 // wrong matches move it by more than the spread of the residuals tells.
@@ -46,11 +46,6 @@ constexpr double kFocalShare = 4;
 // What is left of a refined focal length's variance at the least, over that of its prior: three
 // tenths of the standard deviation.
 constexpr double kFocalFloor = 0.09;
-
-// The relative gain of the cost at which each round stops. The pose of the first round only serves
-// to select the near matches and to estimate the noise. A step that gains less than a millionth of
-// the cost is a fiftieth of a standard deviation long, and the next one a tenth of that.
-constexpr double kFinalGains[kFinalRounds] = {1e-3, 1e-6};
 
 // Writes the matches that take part in a pose's final refinement to f.indices; returns how many.
 int near_pose(const PoseRefiner& f, const Pose& pose) {
@@ -87,8 +82,8 @@ BestLoss best_loss(const PoseRefiner& f, const Mat3& M, int count) {
   double least = 0;
   BestLoss best{};
   for (const double factor : kScales) {
-    const double scale =
-        std::max(0.02 * f.threshold_px, std::min(factor * sigma, kLargestScale * f.threshold_px));
+    const double scale = std::max(kLeastScale * f.threshold_px,
+                                  std::min(factor * sigma, kLargestScale * f.threshold_px));
     const double inverse_sq = 1 / (scale * scale);
     double psi_sq = 0, slope = 0, weights = 0;
     for (int k = 0; k < count; ++k) {
@@ -101,7 +96,7 @@ BestLoss best_loss(const PoseRefiner& f, const Mat3& M, int count) {
     least = slope > 0 ? psi_sq / (slope * slope) : kInfinity;
     best.loss = RobustLoss{Loss::kCauchy, scale};
     best.taken = slope > 0 ? std::sqrt(psi_sq / slope) : sigma;
-    best.stretch = weights < kMostStretch * slope ? weights / slope : kMostStretch;
+    best.stretch = stretch_of(weights, slope);
   }
   return best;
 }
@@ -153,10 +148,6 @@ GravityPrior tested_gravity(const PoseRefiner& f, const Pose& start) {
   return gravity;
 }
 
-// Twice the logarithm of a thousand: the limit of the test for a significance of 0.001. One in a
-// thousand pairs with a correct principal point exceeds it.
-constexpr double kShiftEvidence = 13.815510557964274;
-
 // ---- a pose and a plane ----
 
 // Writes the matches that the plane explains to f.indices; returns how many.
@@ -175,18 +166,14 @@ RobustLoss plane_loss(const PoseRefiner& f, const Mat3& H, int count) {
   transfer_squares(f.matches.pairs, f.indices, count, H, f.values);
   const double scale = kPlaneScale * std::sqrt(median(f.values, count)) / 1.1774100225154747;
   return RobustLoss{Loss::kCauchy,
-                    std::max(0.02 * f.threshold_px, std::min(scale, 2 * f.threshold_px))};
+                    std::max(kLeastScale * f.threshold_px, std::min(scale, 2 * f.threshold_px))};
 }
-
-// The 99.9 % quantile of chi-square with two degrees of freedom: a pose whose squared distance from
-// gravity is larger contradicts gravity.
-constexpr double kGravityExcludes = 13.816;
 
 // If gravity contradicts one of two motions and not the other, only the other is left. Returns how
 // many are.
 int exclude_by_gravity(const double from_gravity[2], PlaneFit* fit) {
   for (int k = 0; k < 2; ++k) {
-    if (from_gravity[k] > kGravityExcludes && from_gravity[1 - k] < kGravityExcludes) {
+    if (from_gravity[k] > kEvidence && from_gravity[1 - k] < kEvidence) {
       fit->pose[0] = fit->pose[1 - k];
       fit->certain[0] = fit->certain[1 - k];
       fit->uncertainty[0] = fit->uncertainty[1 - k];
@@ -212,7 +199,7 @@ double median_noise_px(const PoseRefiner& f, const Mat3& M, int count) {
 RobustLoss final_loss(const PoseRefiner& f, const Mat3& M, int count) {
   const double scale = kFinalScale * median_noise_px(f, M, count);
   return RobustLoss{Loss::kCauchy,
-                    std::max(0.02 * f.threshold_px, std::min(scale, f.threshold_px))};
+                    std::max(kLeastScale * f.threshold_px, std::min(scale, f.threshold_px))};
 }
 
 Pose refined_pose(const PoseRefiner& f, const Pose& start) {
@@ -236,7 +223,7 @@ int joint_equations(const PoseRefiner& f, const Pose& pose, const GravityPrior& 
   const BestLoss best = best_loss(f, essential_from_pose(pose), count);
   // The residuals of exact input are rounding errors and no evidence, so the noise counts as at
   // least 0.02 thresholds.
-  e->noise_px = std::max(best.taken, 0.02 * f.threshold_px);
+  e->noise_px = std::max(best.taken, kLeastScale * f.threshold_px);
   e->stretch = best.stretch;
   shifted_equations(f.problem, f.matches, f.indices, count, GravityPoseModel{pose, &gravity},
                     f.principal_point, best.loss, e->noise_px, &e->sums);
@@ -271,7 +258,7 @@ bool principal_point_is_off(const PoseRefiner& f, const Pose& pose, const double
   for (int k = 0; k < 2; ++k) test->asked_px[k] = e.stretch * step[k];
   if (!(sigma_px[0] > 0)) return false;
   for (int k = 0; k < 2; ++k) s[2 * k] += noise_sq / (sigma_px[k] * sigma_px[k]);
-  return tested_step() > kShiftEvidence;
+  return tested_step() > kEvidence;  // of one in a thousand pairs with a correct one
 }
 
 bool move_together(const PoseRefiner& f, Pose* pose, double shift_px[2]) {
@@ -301,7 +288,7 @@ bool step_focal_length(const PoseRefiner& f, double* growth, Pose* pose, double*
   const int count = near_pose(f, *pose);
   if (count <= kNum) return false;
   const BestLoss best = best_loss(f, essential_from_pose(*pose), count);
-  const double noise_px = std::max(best.taken, 0.02 * f.threshold_px);
+  const double noise_px = std::max(best.taken, kLeastScale * f.threshold_px);
   CalibrationEquations e;
   CalibrationSlopes slopes;
   double gradient[kNum], of_pose[15], upper[kNum * (kNum + 1) / 2], steps[kNum], information;

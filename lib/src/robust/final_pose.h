@@ -52,9 +52,7 @@ double median_noise_px(const PoseRefiner& refiner, const Mat3& M, int count);
 // The final loss around a model of which `count` matches are listed in refiner.indices.
 RobustLoss final_loss(const PoseRefiner& refiner, const Mat3& M, int count);
 
-// The final refinement takes the matches within kFinalNear thresholds. It selects them kFinalRounds
-// times, and takes at most kFinalIterations steps each time.
+// The final refinement takes the matches within kFinalNear thresholds.
 inline constexpr double kFinalNear = 3;
-inline constexpr int kFinalRounds = 2, kFinalIterations = 20;
 
 }  // namespace tv

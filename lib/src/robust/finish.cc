@@ -10,6 +10,7 @@
 #include "robust/evidence.h"
 #include "robust/fit.h"
 #include "robust/kind.h"
+#include "robust/m_estimate.h"
 #include "robust/place_focal_length.h"
 #include "robust/place_principal_point.h"
 #include "robust/planar_pose.h"

@@ -114,21 +114,24 @@ GravityPrior gravity_prior(const double gravity0[3], const double gravity1[3], d
   return prior;
 }
 
+void add_turn_information(const Vec3& h, double weight, int parameters, double* upper) {
+  int slot = 0;
+  for (int p = 0; p < 3; ++p) {
+    for (int r = p; r < 3; ++r) upper[slot++] += weight * ((p == r ? 1.0 : 0.0) - h[p] * h[r]);
+    slot += parameters - 3;  // skips the other columns
+  }
+}
+
 double add_gravity_prior(const GravityPrior& prior, const Mat3& R, double noise_px, double scale_px,
                          double upper[15], double gradient[5]) {
   const Vec3 h = R * prior.down[0];
-  // A turn by w moves h by w x h, so that J = -[h]x, J'J = I - h h' and J'(h - down1) = down1 x h:
-  // the two rows of a tangent basis, whichever it is, summed. The residual is the chord, which
-  // increases up to half a turn; its components in a tangent plane decrease beyond a quarter turn.
+  // J'(h - down1) = down1 x h. The residual is the chord, which increases up to half a turn; its
+  // components in a tangent plane decrease beyond a quarter turn.
   const double weight =
       prior.weight * (noise_px * noise_px) / (2 * prior.sigma_rad * prior.sigma_rad);
   const Vec3 slope = prior.down[1].cross(h);
-  int slot = 0;
-  for (int p = 0; p < 3; ++p) {
-    gradient[p] += weight * slope[p];
-    for (int r = p; r < 3; ++r) upper[slot++] += weight * ((p == r ? 1.0 : 0.0) - h[p] * h[r]);
-    slot += 2;  // skips the columns of t
-  }
+  add_turn_information(h, weight, PoseModel::kParameters, upper);
+  for (int p = 0; p < 3; ++p) gradient[p] += weight * slope[p];
   return weight * (h - prior.down[1]).squaredNorm() / (scale_px * scale_px);
 }
 
@@ -140,11 +143,14 @@ double gravity_distance_sq(const GravityPrior& prior, const Mat3& R, const doubl
   return (inverse.a * e[0] * e[0] + 2 * inverse.b * e[0] * e[1]) + inverse.c * e[1] * e[1];
 }
 
-double gravity_weight(const GravityPrior& prior, const Mat3& R, const double covariance[25]) {
-  const double z_sq = gravity_distance_sq(prior, R, covariance);
-  if (!(z_sq > kAgreementSq)) return 1;
-  const double ratio = kAgreementSq / z_sq;
+double gravity_weight(double distance_sq) {
+  if (!(distance_sq > kAgreementSq)) return 1;
+  const double ratio = kAgreementSq / distance_sq;
   return ratio * ratio;
+}
+
+double gravity_weight(const GravityPrior& prior, const Mat3& R, const double covariance[25]) {
+  return gravity_weight(gravity_distance_sq(prior, R, covariance));
 }
 
 void add_gravity_information(const GravityPrior& prior, const Mat3& R, double covariance[25]) {

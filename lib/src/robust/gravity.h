@@ -16,6 +16,11 @@ struct GravityPrior {
 // has known = false if sigma_rad is 0, or if a vector is zero or not finite.
 GravityPrior gravity_prior(const double gravity0[3], const double gravity1[3], double sigma_rad);
 
+// Adds the information on a turn to the packed upper triangle of normal equations whose first three
+// of `parameters` rows are it. A turn by w moves h by w x h, so that J = -[h]x and J'J = I - h h':
+// the two rows of a tangent basis, whichever it is, summed.
+void add_turn_information(const Vec3& h, double weight, int parameters, double* upper);
+
 // Adds the prior's rows to the normal equations of PoseModel. With h = R down0, the term weight
 // noise_px^2 |h - down1|^2 / (2 sigma^2) is added to the sum of the matches' r^2; noise_px is the
 // standard deviation of r. Returns what it adds to the cost, which is in units of scale_px^2.
@@ -26,9 +31,11 @@ double add_gravity_prior(const GravityPrior& prior, const Mat3& R, double noise_
 // the pose's covariance it follows chi-square with two degrees of freedom where both are right.
 double gravity_distance_sq(const GravityPrior& prior, const Mat3& R, const double covariance[25]);
 
-// The weight of the prior against a pose, with its covariance, that the points alone gave: 1 while
-// the two agree at 99 per cent, then falling with the fourth power of their distance in standard
-// deviations. A wrong direction then pulls the pose no farther than one at that limit does.
+// The weight of gravity against a pose that the points alone gave, by the squared distance between
+// them: 1 while the two agree at 99 per cent, then falling with the fourth power of their distance
+// in standard deviations. A wrong direction then pulls the pose no farther than one at that limit
+// does.
+double gravity_weight(double distance_sq);
 double gravity_weight(const GravityPrior& prior, const Mat3& R, const double covariance[25]);
 
 // The covariance of a pose that the points gave, once the prior has been added to them: the two

@@ -6,6 +6,7 @@
 
 #include "robust/gravity.h"
 #include "robust/ldlt.h"
+#include "robust/m_estimate.h"
 #include "robust/models.h"
 
 namespace tv {
@@ -29,9 +30,9 @@ double refine_any(const AnyModel& any, const RayPairs& pairs, const int32_t* ind
   double upper[2][kMostParameters * (kMostParameters + 1) / 2], gradient[2][kMostParameters],
       step[kMostParameters];
   double cost = any.normal_equations(*model, pairs, indices, count, loss, upper[0], gradient[0]);
-  double lambda = 1e-4;
+  Damping damping;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
-    if (!solve_damped(num, upper[0], gradient[0], lambda, step)) break;
+    if (!solve_damped(num, upper[0], gradient[0], damping.lambda, step)) break;
     double step_sq = 0;
     for (int p = 0; p < num; ++p) {
       step[p] *= stretch;
@@ -42,15 +43,13 @@ double refine_any(const AnyModel& any, const RayPairs& pairs, const int32_t* ind
     const double new_cost =
         any.normal_equations(moved, pairs, indices, count, loss, upper[1], gradient[1]);
     if (!(new_cost < cost)) {
-      lambda *= 10;
-      if (lambda > 1e6) break;
+      if (!damping.tighten()) break;
       continue;
     }
     const double gain = cost - new_cost;
     std::swap(*model, moved);
     cost = new_cost;
-    lambda *= 0.1;
-    if (lambda < 1e-10) lambda = 1e-10;
+    damping.ease();
     std::copy(upper[1], upper[1] + packed, upper[0]);
     std::copy(gradient[1], gradient[1] + num, gradient[0]);
     if (gain < small_gain * cost) break;
