@@ -785,7 +785,7 @@ Trajectory turning_flight() {
     const Matrix3 R = product(rotation_of_quaternion(std::sin(a), 0, 0, std::cos(a)),
                               product(rotation_of_quaternion(0, std::sin(b), 0, std::cos(b)),
                                       rotation_of_quaternion(0, 0, std::sin(c), std::cos(c))));
-    flight.push_back({i / 15.0, {R, {0.1 * i, std::sin(0.1 * i), 0}}});
+    flight.push_back({i / 15.0, {R, {0.1 * i, std::sin(0.1 * i), 0.3 * std::cos(0.2 * i)}}});
   }
   return flight;
 }
@@ -830,6 +830,16 @@ void test_a_truth_with_the_other_order_of_its_quaternions_is_told_from_the_right
   // With names the order is known, so that only another body is left.
   TEST_ASSERT_TRUE(holds(words_on_written(names, false, " ", same), "of another body"));
   TEST_ASSERT_TRUE(holds(words_on_written("", false, " ", body), "of another body"));
+}
+
+void test_a_truth_that_never_turns_is_named() {
+  TruePoses truth;
+  truth.poses = turning_flight();
+  for (TimedPose& at : truth.poses) at.pose.R = truth.poses[30].pose.R;
+  TEST_ASSERT_TRUE(
+      holds(rotation_words(turning_flight(), truth), "one and the same in all 60 poses"));
+  // So are those of a path that does not turn, either.
+  TEST_ASSERT_TRUE(rotation_words(truth.poses, truth).empty());
 }
 
 FrameClock clock_of_60(const char* pattern) {
@@ -887,6 +897,8 @@ void test_a_truth_of_another_clock_or_in_degrees_is_named() {
     at.pose.t = {47 + at.pose.t[1] / 111320, 8 + at.pose.t[0] / 75920, 400 + at.pose.t[2]};
   };
   TEST_ASSERT_TRUE(holds(doubts_of(in_degrees), "latitude and longitude in degrees"));
+  const std::string mirrored = doubts_of([](size_t, TimedPose& at) { at.pose.t[1] *= -1; });
+  TEST_ASSERT_TRUE_MESSAGE(holds(mirrored, "the path's mirror image"), mirrored.c_str());
   const std::string far = doubts_of([](size_t, TimedPose& at) { at.pose.t[0] += 47; });
   TEST_ASSERT_TRUE_MESSAGE(far.empty(), far.c_str());
 }
@@ -997,6 +1009,7 @@ int main() {
   RUN_TEST(test_times_that_are_frame_numbers_are_understood_and_said);
   RUN_TEST(test_a_true_pose_with_other_conventions_is_named);
   RUN_TEST(test_a_truth_of_another_clock_or_in_degrees_is_named);
+  RUN_TEST(test_a_truth_that_never_turns_is_named);
   RUN_TEST(test_auc_is_the_area_under_straight_lines_of_recall);
   RUN_TEST(test_percentile_lies_between_its_neighbours);
   RUN_TEST(test_a_distance_has_the_sigma_that_the_pose_gives_it);

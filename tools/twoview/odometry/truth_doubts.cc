@@ -189,13 +189,27 @@ std::string degrees_words(const Trajectory& estimate, const TruePoses& truth) {
   return "";
 }
 
+// The truth's positions as their mirror image.
+std::string mirror_words(const Trajectory& estimate, const TruePoses& truth) {
+  Trajectory mirrored = truth.poses;
+  for (TimedPose& at : mirrored) at.pose.t[0] = -at.pose.t[0];
+  const Accuracy own = accuracy_of(estimate, truth.poses), other = accuracy_of(estimate, mirrored);
+  if (!own.has_errors() || !(kClear * other.ate_rmse < own.ate_rmse)) return "";
+  char text[240];
+  std::snprintf(text, sizeof text,
+                "the truth is the path's mirror image: the path is off by %.2g %% of it, and by "
+                "%.2g %% of its mirror image. Are its axes left-handed (one axis the other way)?",
+                100 * own.ate_rmse / own.path_length, 100 * other.ate_rmse / other.path_length);
+  return text;
+}
+
 }  // namespace
 
 std::vector<std::string> truth_doubts(const Trajectory& estimate, const TruePoses& truth,
                                       const FrameClock& clock) {
   std::vector<std::string> doubts;
-  for (const std::string& words :
-       {clock_words(estimate, truth, clock), degrees_words(estimate, truth)})
+  for (const std::string& words : {clock_words(estimate, truth, clock),
+                                   degrees_words(estimate, truth), mirror_words(estimate, truth)})
     if (!words.empty()) doubts.push_back(words);
   return doubts;
 }

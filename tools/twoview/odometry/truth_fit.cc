@@ -146,12 +146,39 @@ std::string fit_times(const Trajectory& estimate, TruePoses& truth, const FrameC
   return text;
 }
 
+namespace {
+
+// A line where all of the truth's rotations are one and the same and the path turns.
+std::string no_turn_words(const Trajectory& estimate, const Trajectory& truth,
+                          const std::vector<Association>& pairs) {
+  constexpr double kSame = 1e-6, kTurns = 2 / kDegrees;  // radians
+  double own = 0, given = 0;
+  for (const Association& pair : pairs) {
+    const auto turn = [](const Trajectory& path, size_t from, size_t to) {
+      return angle_of(product(transposed(path[from].pose.R), path[to].pose.R));
+    };
+    own = std::max(own, turn(estimate, pairs[0].idx_estimate, pair.idx_estimate));
+    given = std::max(given, turn(truth, pairs[0].idx_truth, pair.idx_truth));
+  }
+  if (pairs.size() < kFewest || given > kSame || own < kTurns) return "";
+  char text[240];
+  std::snprintf(text, sizeof text,
+                "the truth's rotations are one and the same in all %zu poses, while the path turns "
+                "by %.2g deg: they were not recorded, and rpe_rotation_deg is no error of the path",
+                pairs.size(), kDegrees * own);
+  return text;
+}
+
+}  // namespace
+
 std::string rotation_words(const Trajectory& estimate, const TruePoses& truth) {
   // Turns are compared over a twentieth of the path, over which they are well above their errors.
   constexpr size_t kSteps = 20;
   constexpr double kSameAngle = 0.2, kOtherAxis = 0.5;  // errors as shares of the turns
   constexpr double kClear = 3;  // how much smaller the errors of the right order must be
   const std::vector<Association> pairs = associated(estimate, truth.poses);
+  if (const std::string words = no_turn_words(estimate, truth.poses, pairs); !words.empty())
+    return words;
   const size_t step = std::max<size_t>(1, pairs.size() / kSteps);
   double turn = 0, of_angle = 0, of_axis = 0, of_other = 0;
   size_t count = 0;
@@ -195,14 +222,14 @@ std::string rotation_words(const Trajectory& estimate, const TruePoses& truth) {
     std::snprintf(text, sizeof text,
                   "the truth turns by the path's angles (to %.2g deg), but about other axes (%.2g "
                   "deg off), which rpe_rotation_deg has in it: are its rotations those of another "
-                  "body than the camera, or camera_from_world?",
+                  "body than the camera, camera_from_world, or of left-handed axes?",
                   kDegrees * of_angle, kDegrees * of_axis);
   return text;
 }
 
 std::vector<PoseReading> other_readings(const std::vector<Pose>& poses, TruePoses::Order order) {
   std::vector<PoseReading> readings;
-  const auto add = [&](const char* words, const auto& read) {
+  const auto add = [&](const std::string& words, const auto& read) {
     readings.push_back({words, {}});
     for (const Pose& pose : poses) readings.back().poses.push_back(read(pose));
   };
@@ -226,6 +253,17 @@ std::vector<PoseReading> other_readings(const std::vector<Pose>& poses, TruePose
   add("camera_from_world with OpenGL's axes (y up, z backwards): write the inverse poses with the "
       "sign of the second and the third column of each rotation changed",
       [&](const Pose& pose) { return with_opengl_axes(inverse(pose)); });
+  for (const size_t axis : {size_t{1}, size_t{0}, size_t{2}}) {
+    const auto mirrored = [axis](const Pose& pose) {
+      Matrix3 flip{1, 0, 0, 0, 1, 0, 0, 0, 1};
+      flip[4 * axis] = -1;
+      return Pose{product(product(flip, pose.R), flip), applied(flip, pose.t)};
+    };
+    add(std::string("of left-handed axes, ") + "xyz"[axis] + " the other way" +
+            (axis == 1 ? " (Unity's)" : "") + ": change the signs of " + "xyz"[axis] +
+            " of the positions and of the two other quaternion components but w",
+        mirrored);
+  }
   return readings;
 }
 

@@ -28,7 +28,8 @@ std::string fit_times(const Trajectory& estimate, TruePoses& truth, const FrameC
 
 // A line where the truth turns by the same angles as the estimate, but about other axes: its
 // quaternions may be in the other order (then the line says so), or its rotations those of another
-// body. Empty where the axes agree, or where too little turns.
+// body; and where it does not turn at all while the estimate does. Empty where the axes agree, or
+// where too little turns.
 std::string rotation_words(const Trajectory& estimate, const TruePoses& truth);
 
 // Poses of a file as another program may have meant them, when they were read as world_from_cam

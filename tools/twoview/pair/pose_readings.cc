@@ -16,11 +16,21 @@ std::vector<PairReading> other_readings(const Matrix3& R, const Vector3& t) {
   const Matrix3 inverse_R = transposed(R);
   const Vector3 inverse_t = negative(applied(inverse_R, t));
   const auto flipped = [&flip](const Matrix3& M) { return product(product(flip, M), flip); };
-  return {{"cam0_from_cam1, the other direction", inverse_R, inverse_t},
-          {"cam1_from_cam0 with the place of camera 1 in t", R, negative(applied(R, t))},
-          {"cam1_from_cam0 with OpenGL's axes (y up, z backwards)", flipped(R), applied(flip, t)},
-          {"cam0_from_cam1 with OpenGL's axes (y up, z backwards)", flipped(inverse_R),
-           applied(flip, inverse_t)}};
+  std::vector<PairReading> readings = {
+      {"cam0_from_cam1, the other direction", inverse_R, inverse_t},
+      {"cam1_from_cam0 with the place of camera 1 in t", R, negative(applied(R, t))},
+      {"cam1_from_cam0 with OpenGL's axes (y up, z backwards)", flipped(R), applied(flip, t)},
+      {"cam0_from_cam1 with OpenGL's axes (y up, z backwards)", flipped(inverse_R),
+       applied(flip, inverse_t)}};
+  const auto add_mirrored = [&](const char* words, const Matrix3& mirror) {
+    readings.push_back({words, product(product(mirror, R), mirror), applied(mirror, t)});
+  };
+  add_mirrored("cam1_from_cam0 of left-handed axes with y up (Unity's)",
+               {1, 0, 0, 0, -1, 0, 0, 0, 1});
+  add_mirrored("cam1_from_cam0 of left-handed axes with x to the left",
+               {-1, 0, 0, 0, 1, 0, 0, 0, 1});
+  add_mirrored("cam1_from_cam0 of left-handed axes with z backwards", {1, 0, 0, 0, 1, 0, 0, 0, -1});
+  return readings;
 }
 
 std::string reading_words(const Matrix3& R, const Vector3& t, const Matrix3& R_true,
