@@ -210,6 +210,27 @@ class Triangulate(cli.CliTest):
         self.assert_refused(pose(inverse, place), "pose.yaml", "0 % of them", "100 % if",
                             "cam0_from_cam1")
         self.assert_refused(pose(R, place), "100 % if", "the place of camera 1")
+        # Of another pair, a little away; and the matches of pictures of 0.8 times the size.
+        more = [((k * 37 % 23 - 11) / 8, (k * 17 % 19 - 9) / 8, 4 + (k * 29 % 13) / 6)
+                for k in range(60)]
+        rows = [(*pixel(p), *pixel(tuple(a + b for a, b in zip(turned(p), t)))) for p in more]
+
+        def table(scale):
+            return self.write("60.txt", "\n".join(
+                " ".join(repr(scale * v) for v in row) for row in rows))
+
+        self.pose.write_text(f"R: {[v for row in R for v in row]}\nt: {list(t)}\n")
+        right = json.loads(self.succeed(self.triangulate("--json", matches=table(1))).stdout)
+        self.assertEqual((right["verdict"], right["notes"]), ("ok", []))
+        for what, scale, away in (("size", 0.8, t), ("pair", 1, (t[0], 0.4, t[2]))):
+            with self.subTest(what=what):
+                self.pose.write_text(f"R: {[v for row in R for v in row]}\nt: {list(away)}\n")
+                done = self.triangulate("--json", matches=table(scale))
+                self.assertEqual(done.returncode, 3, done.stderr)
+                result = json.loads(done.stdout)
+                self.assertEqual(result["verdict"], "doubtful")
+                self.assertIn("the matches contradict the pose or the cameras",
+                              result["notes"][0])
 
     def test_a_refined_focal_length_is_used_and_a_broken_one_refused(self):
         pose = self.pose.read_text()
