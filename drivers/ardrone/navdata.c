@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "../source/sized.h"
 #include "bytes.h"
 #include "navdata_layout.h"
 #include "twoview_drivers/attitude.h"
@@ -214,12 +215,11 @@ static void take_motion(const ardrone_navdata *navdata, tvs_imu *sample) {
   }
 }
 
-tvs_status ardrone_navdata_to_imu(const ardrone_navdata *navdata, double psi0_rad,
-                                  tvs_imu *sample) {
-  if (!navdata || !sample) return TVS_ERR_NULL;
-  if (sample->struct_size != sizeof *sample) return TVS_ERR_STRUCT_SIZE;
+tvs_status ardrone_navdata_to_imu(const ardrone_navdata *navdata, double psi0_rad, tvs_imu *given) {
+  tvs_imu own, *sample = &own;
+  if (!navdata || !given) return TVS_ERR_NULL;
+  if (!tvs_is_sized(given, TVS_SIZE_THROUGH(tvs_imu, pressure_sigma))) return TVS_ERR_STRUCT_SIZE;
   memset(sample, 0, sizeof *sample);
-  sample->struct_size = sizeof *sample;
   if (ARDRONE_HAS(navdata, ARDRONE_TAG_DEMO)) {
     take_attitude(&navdata->demo, psi0_rad, sample);
     take_motion(navdata, sample);
@@ -243,5 +243,6 @@ tvs_status ardrone_navdata_to_imu(const ardrone_navdata *navdata, double psi0_ra
     sample->pressure_sigma = 5;
     sample->valid |= TVS_IMU_PRESSURE;
   }
+  tvs_write_sized(sample, sizeof *sample, given, given->struct_size);
   return sample->valid ? TVS_OK : TVS_NONE;
 }

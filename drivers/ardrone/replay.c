@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "../source/sized.h"
 #include "bytes.h"
 
 #define MS INT64_C(1000000)
@@ -148,8 +149,10 @@ static FILE *open_file(const char *folder, const char *name) {
   return fopen(path, "rb");
 }
 
-tvs_status ardrone_replay_open(ardrone_replay *replay, const char *folder,
-                               ardrone_transport *transport) {
+tvs_status ardrone_replay_open_sized(ardrone_replay *replay, const char *folder,
+                                     ardrone_transport *transport, size_t transport_size) {
+  const ardrone_transport own = {
+      0, replay, open_channel, send_nowhere, receive_bytes, close_channel, NULL};
   if (!replay || !folder || !transport) return TVS_ERR_NULL;
   if (strlen(folder) >= MAX_FOLDER_BYTES) return TVS_ERR_ARGUMENT;
   memset(replay, 0, sizeof *replay);
@@ -165,13 +168,7 @@ tvs_status ardrone_replay_open(ardrone_replay *replay, const char *folder,
   if (replay->has_packet && replay->packet_ns < replay->origin_ns) {
     replay->origin_ns = replay->packet_ns;
   }
-  transport->struct_size = sizeof *transport;
-  transport->user = replay;
-  transport->open = open_channel;
-  transport->send = send_nowhere;
-  transport->receive = receive_bytes;
-  transport->close = close_channel;
-  transport->descriptor = NULL;
+  tvs_write_sized(&own, sizeof own, transport, transport_size);
   return TVS_OK;
 }
 
@@ -230,24 +227,31 @@ static void read_packet(ardrone_log *log, const ardrone_navdata *navdata, int64_
 
 static tvs_status next_sample(void *user, tvs_imu *sample) {
   ardrone_log *log = user;
+  tvs_imu own;
   uint8_t bytes[ARDRONE_NAVDATA_MAX_BYTES];
   ardrone_navdata navdata;
   int64_t host_ns;
   size_t size;
   if (!sample) return TVS_ERR_NULL;
-  if (sample->struct_size != sizeof *sample) return TVS_ERR_STRUCT_SIZE;
+  if (!tvs_is_sized(sample, TVS_SIZE_THROUGH(tvs_imu, pressure_sigma))) return TVS_ERR_STRUCT_SIZE;
+  memset(&own, 0, sizeof own);
+  own.struct_size = sizeof own;
   while (log->file && read_record(log->file, &host_ns, bytes, sizeof bytes, &size)) {
     if (ardrone_navdata_decode(bytes, size, &navdata) != TVS_OK ||
         ardrone_sequence_check(&log->sequence, &navdata) == ARDRONE_ORDER_LATE) {
       continue;
     }
-    read_packet(log, &navdata, host_ns, sample);
-    if (sample->valid) return TVS_OK;
+    read_packet(log, &navdata, host_ns, &own);
+    if (own.valid == 0) continue;
+    tvs_write_sized(&own, sizeof own, sample, sample->struct_size);
+    return TVS_OK;
   }
   return TVS_END;
 }
 
-tvs_status ardrone_log_open(ardrone_log *log, const char *path, tvs_imu_source *source) {
+tvs_status ardrone_log_open_sized(ardrone_log *log, const char *path, tvs_imu_source *source,
+                                  size_t source_size) {
+  const tvs_imu_source own = {0, log, next_sample};
   tvs_clock_options options;
   if (!log || !path || !source) return TVS_ERR_NULL;
   memset(log, 0, sizeof *log);
@@ -256,9 +260,7 @@ tvs_status ardrone_log_open(ardrone_log *log, const char *path, tvs_imu_source *
   tvs_clock_options_init(&options);
   options.period_ns = ARDRONE_TIME_PERIOD_NS;
   tvs_clock_init(&log->clock, &options, 1, 1);
-  source->struct_size = sizeof *source;
-  source->user = log;
-  source->next = next_sample;
+  tvs_write_sized(&own, sizeof own, source, source_size);
   return TVS_OK;
 }
 

@@ -1,15 +1,14 @@
 #include <string.h>
 
+#include "../source/sized.h"
 #include "session_impl.h"
 
 static const uint32_t DEFAULT_OPTIONS =
     1u << ARDRONE_TAG_DEMO | 1u << ARDRONE_TAG_TIME | 1u << ARDRONE_TAG_PHYS_MEASURES |
     1u << ARDRONE_TAG_ALTITUDE | 1u << ARDRONE_TAG_PRESSURE | 1u << ARDRONE_TAG_VISION_DETECT;
 
-void ardrone_session_options_init(ardrone_session_options *options) {
-  if (!options) return;
+static void set_defaults(ardrone_session_options *options) {
   memset(options, 0, sizeof *options);
-  options->struct_size = sizeof *options;
   options->navdata_options = DEFAULT_OPTIONS;
   options->full_navdata = 1;
   options->video = 1;
@@ -19,19 +18,31 @@ void ardrone_session_options_init(ardrone_session_options *options) {
   options->max_gap_ns = 150 * MS;
 }
 
-static tvs_status check_options(const ardrone_session_options *options) {
-  if (!options) return TVS_ERR_NULL;
-  if (options->struct_size != sizeof *options) return TVS_ERR_STRUCT_SIZE;
+void ardrone_session_options_init_sized(ardrone_session_options *options, size_t struct_size) {
+  ardrone_session_options own;
+  if (!options) return;
+  set_defaults(&own);
+  tvs_write_sized(&own, sizeof own, options, struct_size);
+}
+
+static tvs_status read_options(const ardrone_session_options *given,
+                               ardrone_session_options *options, tvs_decoder *decoder) {
+  tvs_status status;
+  if (!given) return TVS_ERR_NULL;
+  set_defaults(options);
+  status = tvs_read_sized(given, TVS_SIZE_THROUGH(ardrone_session_options, on_frame), options,
+                          sizeof *options);
+  if (status != TVS_OK) return status;
   if (!options->name) return TVS_ERR_NULL;
   if (strlen(options->name) > MAX_NAME_BYTES || options->max_gap_ns < 0 ||
       options->video_codec < 0 || options->video_codec > 255 || options->queue_frames < 0 ||
       options->queue_frames > QUEUE_FRAMES) {
     return TVS_ERR_ARGUMENT;
   }
-  if (options->decoder && options->decoder->struct_size != sizeof *options->decoder) {
-    return TVS_ERR_STRUCT_SIZE;
-  }
-  return TVS_OK;
+  memset(decoder, 0, sizeof *decoder);
+  return options->decoder ? tvs_read_sized(options->decoder, TVS_SIZE_THROUGH(tvs_decoder, reset),
+                                           decoder, sizeof *decoder)
+                          : TVS_OK;
 }
 
 static size_t bytes_needed(const ardrone_session_options *options) {
@@ -40,10 +51,12 @@ static size_t bytes_needed(const ardrone_session_options *options) {
 }
 
 tvs_status ardrone_session_size(const ardrone_session_options *options, size_t *size_bytes) {
-  const tvs_status status = check_options(options);
+  ardrone_session_options read;
+  tvs_decoder decoder;
+  const tvs_status status = read_options(options, &read, &decoder);
   if (status != TVS_OK) return status;
   if (!size_bytes) return TVS_ERR_NULL;
-  *size_bytes = bytes_needed(options);
+  *size_bytes = bytes_needed(&read);
   return TVS_OK;
 }
 
@@ -85,24 +98,27 @@ static void make_ids(ardrone_session *session) {
 tvs_status ardrone_session_init(ardrone_session **session, const ardrone_session_options *options,
                                 const ardrone_transport *transport, void *memory,
                                 size_t size_bytes) {
-  tvs_status status = check_options(options);
   ardrone_session *s = memory;
+  ardrone_session_options read;
+  ardrone_transport own;
+  tvs_decoder decoder;
   uint8_t *buffer;
+  tvs_status status = read_options(options, &read, &decoder);
   if (status != TVS_OK) return status;
   if (!session || !transport || !memory) return TVS_ERR_NULL;
-  if (transport->struct_size != sizeof *transport) return TVS_ERR_STRUCT_SIZE;
-  if (!transport->open || !transport->send || !transport->receive || !transport->close) {
-    return TVS_ERR_NULL;
-  }
-  if (size_bytes < bytes_needed(options)) return TVS_ERR_CAPACITY;
+  status =
+      tvs_read_sized(transport, TVS_SIZE_THROUGH(ardrone_transport, descriptor), &own, sizeof own);
+  if (status != TVS_OK) return status;
+  if (!own.open || !own.send || !own.receive || !own.close) return TVS_ERR_NULL;
+  if (size_bytes < bytes_needed(&read)) return TVS_ERR_CAPACITY;
   memset(s, 0, sizeof *s);
-  s->options = *options;
-  s->options.use_ids = options->use_ids || options->video_codec;
-  s->transport = *transport;
-  if (options->decoder) s->decoder = *options->decoder;
+  s->options = read;
+  s->options.use_ids = read.use_ids || read.video_codec;
+  s->transport = own;
+  s->decoder = decoder;
   s->now_ns = s->open_retry_ns = INT64_MIN;
-  buffer = init_stream(&s->video, ARDRONE_CHANNEL_VIDEO, options->video, (uint8_t *)(s + 1));
-  init_stream(&s->recording, ARDRONE_CHANNEL_RECORDING, options->recording, buffer);
+  buffer = init_stream(&s->video, ARDRONE_CHANNEL_VIDEO, read.video, (uint8_t *)(s + 1));
+  init_stream(&s->recording, ARDRONE_CHANNEL_RECORDING, read.recording, buffer);
   init_clocks(s);
   tvs_attitudes_init(&s->attitudes);
   ardrone_pilot_init(&s->pilot);
@@ -165,19 +181,19 @@ void ardrone_session_counters(const ardrone_session *session, ardrone_counters *
 static tvs_status next_imu(void *user, tvs_imu *sample) {
   ardrone_session *session = user;
   if (!sample) return TVS_ERR_NULL;
-  if (sample->struct_size != sizeof *sample) return TVS_ERR_STRUCT_SIZE;
+  if (!tvs_is_sized(sample, TVS_SIZE_THROUGH(tvs_imu, pressure_sigma))) return TVS_ERR_STRUCT_SIZE;
   if (session->num_imu == 0) return TVS_NONE;
-  *sample = session->imu[session->first_imu];
+  tvs_write_sized(&session->imu[session->first_imu], sizeof *sample, sample, sample->struct_size);
   session->first_imu = (session->first_imu + 1) % QUEUE_IMU;
   --session->num_imu;
   return TVS_OK;
 }
 
-tvs_status ardrone_session_imu(ardrone_session *session, tvs_imu_source *source) {
+tvs_status ardrone_session_imu_sized(ardrone_session *session, tvs_imu_source *source,
+                                     size_t source_size) {
+  const tvs_imu_source own = {0, session, next_imu};
   if (!session || !source) return TVS_ERR_NULL;
-  source->struct_size = sizeof *source;
-  source->user = session;
-  source->next = next_imu;
+  tvs_write_sized(&own, sizeof own, source, source_size);
   return TVS_OK;
 }
 

@@ -2,6 +2,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "../source/sized.h"
 #include "session_impl.h"
 
 static const int64_t SILENT_NS = 1000 * MS, RETRY_NS = 150 * MS;
@@ -288,13 +289,15 @@ void ardrone_video_close(ardrone_session *session) {
 
 static tvs_status next_frame(void *user, tvs_frame *frame) {
   ardrone_session *session = user;
+  tvs_frame own;
   if (!frame) return TVS_ERR_NULL;
-  if (frame->struct_size != sizeof *frame) return TVS_ERR_STRUCT_SIZE;
+  if (!tvs_is_sized(frame, TVS_SIZE_THROUGH(tvs_frame, handle))) return TVS_ERR_STRUCT_SIZE;
   if (session->num_frames == 0) return TVS_NONE;
-  *frame = *frame_at(session, 0);
+  own = *frame_at(session, 0);
   session->first_frame = (session->first_frame + 1) % QUEUE_FRAMES;
   --session->num_frames;
-  if ((frame->flags & TVS_FRAME_HAS_ATTITUDE) == 0) add_attitude(session, frame);
+  if ((own.flags & TVS_FRAME_HAS_ATTITUDE) == 0) add_attitude(session, &own);
+  tvs_write_sized(&own, sizeof own, frame, frame->struct_size);
   return TVS_OK;
 }
 
@@ -302,12 +305,11 @@ static void release_frame(void *user, tvs_frame *frame) {
   if (frame) give_back(user, frame);
 }
 
-tvs_status ardrone_session_frames(ardrone_session *session, tvs_frame_source *source) {
+tvs_status ardrone_session_frames_sized(ardrone_session *session, tvs_frame_source *source,
+                                        size_t source_size) {
+  const tvs_frame_source own = {0, session, next_frame, release_frame};
   if (!session || !source) return TVS_ERR_NULL;
   if (!session->decoder.decode) return TVS_ERR_STATE;
-  source->struct_size = sizeof *source;
-  source->user = session;
-  source->next = next_frame;
-  source->release = release_frame;
+  tvs_write_sized(&own, sizeof own, source, source_size);
   return TVS_OK;
 }

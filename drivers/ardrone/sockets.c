@@ -12,6 +12,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "../source/sized.h"
 #include "session_impl.h"
 
 static const uint16_t PORTS[ARDRONE_NUM_CHANNELS] = {5556, 5554, 5555, 5559, 5553};
@@ -113,8 +114,10 @@ static int descriptor_of(void *user, ardrone_channel channel) {
   return ((ardrone_sockets *)user)->descriptor[channel];
 }
 
-tvs_status ardrone_sockets_init(ardrone_sockets *sockets, const char *host,
-                                ardrone_transport *transport) {
+tvs_status ardrone_sockets_init_sized(ardrone_sockets *sockets, const char *host,
+                                      ardrone_transport *transport, size_t transport_size) {
+  const ardrone_transport own = {
+      0, sockets, open_channel, send_bytes, receive_bytes, close_channel, descriptor_of};
   struct addrinfo hints, *found = NULL;
   int channel;
   if (!sockets || !host || !transport) return TVS_ERR_NULL;
@@ -128,13 +131,7 @@ tvs_status ardrone_sockets_init(ardrone_sockets *sockets, const char *host,
     sockets->port[channel] = PORTS[channel];
     sockets->descriptor[channel] = -1;
   }
-  transport->struct_size = sizeof *transport;
-  transport->user = sockets;
-  transport->open = open_channel;
-  transport->send = send_bytes;
-  transport->receive = receive_bytes;
-  transport->close = close_channel;
-  transport->descriptor = descriptor_of;
+  tvs_write_sized(&own, sizeof own, transport, transport_size);
   return TVS_OK;
 }
 

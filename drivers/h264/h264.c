@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "../source/sized.h"
+
 enum { MAX_BYTES = 1 << 24 };
 
 typedef struct h264 {
@@ -79,7 +81,8 @@ static void free_all(h264 *own) {
   free(own);
 }
 
-tvs_status tvs_h264_open(tvs_decoder *decoder) {
+tvs_status tvs_h264_open_sized(tvs_decoder *decoder, size_t decoder_size) {
+  tvs_decoder made = {0};
   const AVCodec *codec = avcodec_find_decoder(AV_CODEC_ID_H264);
   h264 *own;
   if (!decoder) return TVS_ERR_NULL;
@@ -100,16 +103,16 @@ tvs_status tvs_h264_open(tvs_decoder *decoder) {
     free_all(own);
     return TVS_ERR_STATE;
   }
-  decoder->struct_size = sizeof *decoder;
-  decoder->user = own;
-  decoder->decode = decode;
-  decoder->release = release;
-  decoder->reset = reset;
+  made.user = own;
+  made.decode = decode;
+  made.release = release;
+  made.reset = reset;
+  tvs_write_sized(&made, sizeof made, decoder, decoder_size);
   return TVS_OK;
 }
 
 void tvs_h264_close(tvs_decoder *decoder) {
   if (!decoder || !decoder->user) return;
   free_all(decoder->user);
-  memset(decoder, 0, sizeof *decoder);
+  memset(decoder, 0, TVS_SIZE_THROUGH(tvs_decoder, reset));
 }

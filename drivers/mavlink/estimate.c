@@ -8,6 +8,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "../source/sized.h"
+
 static const int64_t MOST_STEP_NS = INT64_C(500000000); /* between frames that give a velocity */
 /* The acceleration of a vehicle of which one velocity alone is known, m/s^2 and rad/s^2. */
 static const double ACCELERATION = 5.0;
@@ -122,11 +124,9 @@ static int is_rotation(const double *R) {
 
 /* ---- options ---- */
 
-void tvm_estimator_options_init(tvm_estimator_options *options) {
+static void set_defaults(tvm_estimator_options *options) {
   static const double ahead[9] = {0, 0, 1, 1, 0, 0, 0, 1, 0};
-  if (!options) return;
   memset(options, 0, sizeof *options);
-  options->struct_size = sizeof *options;
   options->messages = TVM_SEND_ODOMETRY;
   options->weak_factor = 3;
   options->drift_share = 0.005;
@@ -134,9 +134,21 @@ void tvm_estimator_options_init(tvm_estimator_options *options) {
   memcpy(options->body_from_camera, ahead, sizeof ahead);
 }
 
-tvs_status tvm_estimator_init(tvm_estimator *estimator, const tvm_estimator_options *options) {
-  if (!estimator || !options) return TVS_ERR_NULL;
-  if (options->struct_size != sizeof *options) return TVS_ERR_STRUCT_SIZE;
+void tvm_estimator_options_init_sized(tvm_estimator_options *options, size_t struct_size) {
+  tvm_estimator_options own;
+  if (!options) return;
+  set_defaults(&own);
+  tvs_write_sized(&own, sizeof own, options, struct_size);
+}
+
+tvs_status tvm_estimator_init(tvm_estimator *estimator, const tvm_estimator_options *given) {
+  tvm_estimator_options own, *options = &own;
+  tvs_status status;
+  if (!estimator || !given) return TVS_ERR_NULL;
+  set_defaults(options);
+  status = tvs_read_sized(given, TVS_SIZE_THROUGH(tvm_estimator_options, drift_turn_rad), options,
+                          sizeof *options);
+  if (status != TVS_OK) return status;
   if (options->messages < 1 || options->messages > 3 || options->weak < TVM_WEAK_SILENT ||
       options->weak > TVM_WEAK_GROWN || options->world < TVM_WORLD_FRD ||
       options->world > TVM_WORLD_NED ||
@@ -401,16 +413,39 @@ static void estimate_of(tvm_estimator *e, const tvm_track *track, tvm_estimate *
   out->time_us = track->time_us;
 }
 
-tvs_status tvm_estimator_update(tvm_estimator *e, const tvm_track *track, tvm_estimate *estimate) {
+/* Reads a track, and its state as far as that goes: it is of the odometry's library, which may be
+   an older or a newer one. */
+static tvs_status read_track(const tvm_track *given, tvm_track *track, tv_odometry_state *state) {
+  size_t size;
+  tvs_status status;
+  memset(track, 0, sizeof *track);
+  status = tvs_read_sized(given, TVS_SIZE_THROUGH(tvm_track, heading_rad), track, sizeof *track);
+  if (status != TVS_OK) return status;
+  if (!track->state) return TVS_ERR_NULL;
+  if (!tvs_is_sized(track->state, TVS_SIZE_THROUGH(tv_odometry_state, reserved_end))) {
+    return TVS_ERR_STRUCT_SIZE;
+  }
+  size = track->state->struct_size < sizeof *state ? track->state->struct_size : sizeof *state;
+  memset(state, 0, sizeof *state);
+  memcpy(state, track->state, size);
+  track->state = state;
+  return TVS_OK;
+}
+
+tvs_status tvm_estimator_update(tvm_estimator *e, const tvm_track *given, tvm_estimate *out) {
   tvm_silence silence;
-  if (!e || !track || !estimate || !track->state) return TVS_ERR_NULL;
-  if (track->struct_size != sizeof *track || estimate->struct_size != sizeof *estimate ||
-      track->state->struct_size < sizeof *track->state) {
+  tvm_track own, *track = &own;
+  tvm_estimate made, *estimate = &made;
+  tv_odometry_state state;
+  tvs_status status;
+  if (!e || !given || !out) return TVS_ERR_NULL;
+  status = read_track(given, track, &state);
+  if (status != TVS_OK) return status;
+  if (!tvs_is_sized(out, TVS_SIZE_THROUGH(tvm_estimate, velocity_covariance))) {
     return TVS_ERR_STRUCT_SIZE;
   }
   if (track->host_ns <= e->last_ns) return TVS_ERR_ARGUMENT;
   memset(estimate, 0, sizeof *estimate);
-  estimate->struct_size = sizeof *estimate;
   if (track->state->has_pose) count_resets(e, track);
   silence = silence_of(e, track);
   if (silence == TVM_SILENCE_NONE || silence == TVM_SILENCE_WEAK) {
@@ -426,5 +461,6 @@ tvs_status tvm_estimator_update(tvm_estimator *e, const tvm_track *track, tvm_es
   e->last_ns = track->host_ns;
   estimate->silence = silence;
   estimate->reset_counter = e->reset_counter;
+  tvs_write_sized(estimate, sizeof *estimate, out, out->struct_size);
   return TVS_OK;
 }

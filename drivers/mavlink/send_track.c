@@ -2,6 +2,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "../source/sized.h"
 #include "session_impl.h"
 #include "twoview_drivers/mavlink/estimate.h"
 
@@ -84,10 +85,15 @@ size_t tvm_estimate_pack(const tvm_estimate *estimate, int message, uint8_t syst
                          uint8_t component, uint8_t sequence, uint8_t *bytes) {
   mavlink_message_t m;
   mavlink_status_t sender;
-  if (!estimate || !bytes || estimate->struct_size != sizeof *estimate) return 0;
+  tvm_estimate own;
+  if (!estimate || !bytes ||
+      tvs_read_sized(estimate, TVS_SIZE_THROUGH(tvm_estimate, velocity_covariance), &own,
+                     sizeof own) != TVS_OK) {
+    return 0;
+  }
   memset(&sender, 0, sizeof sender);
   sender.current_tx_seq = sequence;
-  if (!make_message(estimate, message, system, component, &sender, &m)) return 0;
+  if (!make_message(&own, message, system, component, &sender, &m)) return 0;
   return mavlink_msg_to_send_buffer(bytes, &m);
 }
 
@@ -162,9 +168,13 @@ tvs_status tvm_session_send_track(tvm_session *session, tvm_estimator *estimator
   tvs_status status;
   mavlink_message_t m;
   int message, num_sent = 0;
-  if (!session || !estimator || !tracked || !tracked->state) return TVS_ERR_NULL;
-  if (tracked->struct_size != sizeof *tracked) return TVS_ERR_STRUCT_SIZE;
-  known = *tracked;
+  if (!session || !estimator || !tracked) return TVS_ERR_NULL;
+  status = tvs_read_sized(tracked, TVS_SIZE_THROUGH(tvm_track, heading_rad), &known, sizeof known);
+  if (status != TVS_OK) return status;
+  if (!tracked->state) return TVS_ERR_NULL;
+  if (estimate && !tvs_is_sized(estimate, TVS_SIZE_THROUGH(tvm_estimate, velocity_covariance))) {
+    return TVS_ERR_STRUCT_SIZE;
+  }
   known.is_upright = 0;
   memset(&own, 0, sizeof own);
   own.struct_size = sizeof own;
@@ -181,7 +191,7 @@ tvs_status tvm_session_send_track(tvm_session *session, tvm_estimator *estimator
   }
   status = tvm_estimator_update(estimator, &known, &own);
   if (status != TVS_OK) return status;
-  if (estimate) *estimate = own;
+  if (estimate) tvs_write_sized(&own, sizeof own, estimate, estimate->struct_size);
   if (session->options.listen_only || session->vehicle == 0) return TVS_NONE;
   tell(session, estimator, own.silence);
   for (message = TVM_SEND_ODOMETRY; message <= TVM_SEND_VISION_POSITION; message <<= 1) {

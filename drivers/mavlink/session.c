@@ -1,15 +1,14 @@
 #include <math.h>
 #include <string.h>
 
+#include "../source/sized.h"
 #include "session_impl.h"
 
 static const int64_t SILENT_NS = 3 * SECOND, NO_ATTITUDE_NS = 1 * SECOND;
 enum { MAX_DATAGRAMS = 512 };
 
-void tvm_session_options_init(tvm_session_options *options) {
-  if (!options) return;
+static void set_defaults(tvm_session_options *options) {
   memset(options, 0, sizeof *options);
-  options->struct_size = sizeof *options;
   options->own_component = MAV_COMP_ID_ONBOARD_COMPUTER;
   options->attitude_hz = 50;
   options->position_hz = 30;
@@ -20,12 +19,22 @@ void tvm_session_options_init(tvm_session_options *options) {
   options->hold_frame_ns = 200 * MS;
 }
 
+void tvm_session_options_init_sized(tvm_session_options *options, size_t struct_size) {
+  tvm_session_options own;
+  if (!options) return;
+  set_defaults(&own);
+  tvs_write_sized(&own, sizeof own, options, struct_size);
+}
+
 size_t tvm_session_size(void) { return sizeof(tvm_session); }
 
 static int is_rate(double hz) { return hz > 0 && hz <= 1000; }
 
-static tvs_status check_options(const tvm_session_options *o) {
-  if (o->struct_size != sizeof *o) return TVS_ERR_STRUCT_SIZE;
+static tvs_status read_options(const tvm_session_options *given, tvm_session_options *o) {
+  tvs_status status;
+  set_defaults(o);
+  status = tvs_read_sized(given, TVS_SIZE_THROUGH(tvm_session_options, on_event), o, sizeof *o);
+  if (status != TVS_OK) return status;
   if (o->vehicle_system < 0 || o->vehicle_system > 255 || o->own_system < 0 ||
       o->own_system > 255 || o->own_component < 1 || o->own_component > 255 ||
       !is_rate(o->attitude_hz) || !is_rate(o->position_hz) || !is_rate(o->height_hz) ||
@@ -40,22 +49,25 @@ static tvs_status check_options(const tvm_session_options *o) {
 tvs_status tvm_session_init(tvm_session **session, const tvm_session_options *options,
                             const tvm_transport *transport, void *memory, size_t size_bytes) {
   tvm_session *s = memory;
+  tvm_session_options read;
+  tvm_transport own;
   tvs_clock_options clock;
   tvs_status status;
   if (!session || !options || !transport || !memory) return TVS_ERR_NULL;
-  status = check_options(options);
+  status = read_options(options, &read);
   if (status != TVS_OK) return status;
-  if (transport->struct_size != sizeof *transport) return TVS_ERR_STRUCT_SIZE;
-  if (!transport->send || !transport->receive) return TVS_ERR_NULL;
+  status = tvs_read_sized(transport, TVS_SIZE_THROUGH(tvm_transport, descriptor), &own, sizeof own);
+  if (status != TVS_OK) return status;
+  if (!own.send || !own.receive) return TVS_ERR_NULL;
   if (size_bytes < sizeof *s) return TVS_ERR_CAPACITY;
   memset(s, 0, sizeof *s);
-  s->options = *options;
-  s->transport = *transport;
+  s->options = read;
+  s->transport = own;
   s->now_ns = s->heartbeat_due_ns = s->timesync_due_ns = s->requests_due_ns = INT64_MIN;
-  s->requests[0] = (wanted){MAVLINK_MSG_ID_ATTITUDE, options->attitude_hz, 1, 0, 0};
-  s->requests[1] = (wanted){MAVLINK_MSG_ID_LOCAL_POSITION_NED, options->position_hz, 0, 0, 0};
-  s->requests[2] = (wanted){MAVLINK_MSG_ID_ALTITUDE, options->height_hz, 0, 0, 0};
-  s->requests[3] = (wanted){MAVLINK_MSG_ID_DISTANCE_SENSOR, options->height_hz, 0, 0, 0};
+  s->requests[0] = (wanted){MAVLINK_MSG_ID_ATTITUDE, read.attitude_hz, 1, 0, 0};
+  s->requests[1] = (wanted){MAVLINK_MSG_ID_LOCAL_POSITION_NED, read.position_hz, 0, 0, 0};
+  s->requests[2] = (wanted){MAVLINK_MSG_ID_ALTITUDE, read.height_hz, 0, 0, 0};
+  s->requests[3] = (wanted){MAVLINK_MSG_ID_DISTANCE_SENSOR, read.height_hz, 0, 0, 0};
   tvs_clock_options_init(&clock);
   clock.period_ns = INT64_C(4294967296) * MS; /* time_boot_ms has 32 bits */
   tvs_clock_init(&s->clock, &clock, 1, 1);
@@ -125,19 +137,18 @@ uint64_t tvm_session_num_invalid(const tvm_session *session) {
 static tvs_status next_imu(void *user, tvs_imu *sample) {
   tvm_session *s = user;
   if (!sample) return TVS_ERR_NULL;
-  if (sample->struct_size != sizeof *sample) return TVS_ERR_STRUCT_SIZE;
+  if (!tvs_is_sized(sample, TVS_SIZE_THROUGH(tvs_imu, pressure_sigma))) return TVS_ERR_STRUCT_SIZE;
   if (s->num_imu == 0) return TVS_NONE;
-  *sample = s->imu[s->first_imu];
+  tvs_write_sized(&s->imu[s->first_imu], sizeof *sample, sample, sample->struct_size);
   s->first_imu = (s->first_imu + 1) % QUEUE_IMU;
   --s->num_imu;
   return TVS_OK;
 }
 
-tvs_status tvm_session_imu(tvm_session *session, tvs_imu_source *source) {
+tvs_status tvm_session_imu_sized(tvm_session *session, tvs_imu_source *source, size_t source_size) {
+  const tvs_imu_source own = {0, session, next_imu};
   if (!session || !source) return TVS_ERR_NULL;
-  source->struct_size = sizeof *source;
-  source->user = session;
-  source->next = next_imu;
+  tvs_write_sized(&own, sizeof own, source, source_size);
   return TVS_OK;
 }
 
@@ -192,7 +203,7 @@ static tvs_status next_frame(void *user, tvs_frame *frame) {
   tvs_time time;
   tvs_status status;
   if (!frame) return TVS_ERR_NULL;
-  if (frame->struct_size != sizeof *frame) return TVS_ERR_STRUCT_SIZE;
+  if (!tvs_is_sized(frame, TVS_SIZE_THROUGH(tvs_frame, handle))) return TVS_ERR_STRUCT_SIZE;
   status = fill_held(s);
   if (status != TVS_OK) return status;
   first = &s->held[s->first_held];
@@ -207,7 +218,7 @@ static tvs_status next_frame(void *user, tvs_frame *frame) {
     first->flags |= TVS_FRAME_HAS_ATTITUDE;
     first->time = time;
   }
-  *frame = *first;
+  tvs_write_sized(first, sizeof *first, frame, frame->struct_size);
   s->first_held = (s->first_held + 1) % QUEUE_FRAMES;
   --s->num_held;
   return TVS_OK;
@@ -218,19 +229,20 @@ static void release_frame(void *user, tvs_frame *frame) {
   if (frame) s->camera.release(s->camera.user, frame);
 }
 
-tvs_status tvm_session_frames(tvm_session *session, const tvs_frame_source *camera,
-                              tvs_frame_source *source) {
+tvs_status tvm_session_frames_sized(tvm_session *session, const tvs_frame_source *camera,
+                                    tvs_frame_source *source, size_t source_size) {
+  const tvs_frame_source own = {0, session, next_frame, release_frame};
+  tvs_frame_source read;
+  tvs_status status;
   if (!session || !camera || !source) return TVS_ERR_NULL;
-  if (camera->struct_size != sizeof *camera) return TVS_ERR_STRUCT_SIZE;
-  if (!camera->next || !camera->release) return TVS_ERR_NULL;
+  status = tvs_read_sized(camera, TVS_SIZE_THROUGH(tvs_frame_source, release), &read, sizeof read);
+  if (status != TVS_OK) return status;
+  if (!read.next || !read.release) return TVS_ERR_NULL;
   for (; session->num_held > 0; --session->num_held) {
     session->camera.release(session->camera.user, &session->held[session->first_held]);
     session->first_held = (session->first_held + 1) % QUEUE_FRAMES;
   }
-  session->camera = *camera;
-  source->struct_size = sizeof *source;
-  source->user = session;
-  source->next = next_frame;
-  source->release = release_frame;
+  session->camera = read;
+  tvs_write_sized(&own, sizeof own, source, source_size);
   return TVS_OK;
 }

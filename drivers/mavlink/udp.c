@@ -12,6 +12,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "../source/sized.h"
+
 static struct sockaddr_in address_of(uint32_t address, uint16_t port) {
   struct sockaddr_in result;
   memset(&result, 0, sizeof result);
@@ -94,7 +96,9 @@ static int set_flags(int fd) {
          fcntl(fd, F_SETFD, FD_CLOEXEC) == 0;
 }
 
-tvs_status tvm_udp_open(tvm_udp *udp, const char *address, tvm_transport *transport) {
+tvs_status tvm_udp_open_sized(tvm_udp *udp, const char *address, tvm_transport *transport,
+                              size_t transport_size) {
+  const tvm_transport own = {0, udp, send_bytes, receive_bytes, keep_sender, descriptor_of};
   char host[256];
   struct addrinfo hints, *found = NULL;
   struct sockaddr_in to;
@@ -122,12 +126,7 @@ tvs_status tvm_udp_open(tvm_udp *udp, const char *address, tvm_transport *transp
     udp->peer_address = to.sin_addr.s_addr;
     udp->peer_port = to.sin_port;
   }
-  transport->struct_size = sizeof *transport;
-  transport->user = udp;
-  transport->send = send_bytes;
-  transport->receive = receive_bytes;
-  transport->keep_sender = keep_sender;
-  transport->descriptor = descriptor_of;
+  tvs_write_sized(&own, sizeof own, transport, transport_size);
   return TVS_OK;
 }
 

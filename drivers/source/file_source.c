@@ -2,24 +2,27 @@
 
 #include <string.h>
 
+#include "sized.h"
 #include "twoview_drivers/attitude.h"
 
 struct tvs_file_source {
   tvs_file_options options;
-  uint64_t index; /* number of the next picture to read */
-  int gap;        /* whether a picture was left out since the last frame */
+  tvs_imu_source imu; /* a copy of *options.imu, to which options.imu points */
+  uint64_t index;     /* number of the next picture to read */
+  int gap;            /* whether a picture was left out since the last frame */
   int imu_ended;
   int64_t imu_device_ns; /* time of the newest attitude that was read from options.imu, ns */
   tvs_attitudes attitudes;
 };
 
-void tvs_file_options_init(tvs_file_options *options) {
+void tvs_file_options_init_sized(tvs_file_options *options, size_t struct_size) {
+  tvs_file_options own;
   if (!options) return;
-  memset(options, 0, sizeof *options);
-  options->struct_size = sizeof *options;
-  options->frames_per_second = 30;
-  options->clock_id = 1;
-  options->max_gap_ns = 100000000;
+  memset(&own, 0, sizeof own);
+  own.frames_per_second = 30;
+  own.clock_id = 1;
+  own.max_gap_ns = 100000000;
+  tvs_write_sized(&own, sizeof own, options, struct_size);
 }
 
 size_t tvs_file_source_size(void) { return sizeof(tvs_file_source); }
@@ -46,14 +49,16 @@ static void read_attitudes_until(tvs_file_source *source, int64_t device_ns) {
   }
 }
 
-static tvs_status next_frame(void *user, tvs_frame *frame) {
+static tvs_status next_frame(void *user, tvs_frame *given) {
   tvs_file_source *source = user;
+  tvs_frame own, *frame = &own;
   tvs_picture picture;
   int64_t device_ns;
   uint64_t index;
   tvs_status status;
-  if (!frame) return TVS_ERR_NULL;
-  if (frame->struct_size != sizeof *frame) return TVS_ERR_STRUCT_SIZE;
+  if (!given) return TVS_ERR_NULL;
+  if (!tvs_is_sized(given, TVS_SIZE_THROUGH(tvs_frame, handle))) return TVS_ERR_STRUCT_SIZE;
+  memset(frame, 0, sizeof *frame);
   do {
     index = source->index;
     memset(&picture, 0, sizeof picture);
@@ -73,7 +78,6 @@ static tvs_status next_frame(void *user, tvs_frame *frame) {
   frame->time.uncertainty_ns = 0;
   frame->time.clock_id = source->options.clock_id;
   frame->time.reserved = 0;
-  memset(&frame->attitude, 0, sizeof frame->attitude);
   if (source->options.imu) {
     read_attitudes_until(source, device_ns);
     if (tvs_attitudes_at(&source->attitudes, source->options.clock_id, device_ns,
@@ -81,6 +85,7 @@ static tvs_status next_frame(void *user, tvs_frame *frame) {
       frame->flags |= TVS_FRAME_HAS_ATTITUDE;
     }
   }
+  tvs_write_sized(frame, sizeof *frame, given, given->struct_size);
   return TVS_OK;
 }
 
@@ -93,24 +98,41 @@ static void release_frame(void *user, tvs_frame *frame) {
   source->options.release(source->options.user, &picture);
 }
 
-tvs_status tvs_file_source_init(void *memory, size_t size_bytes, const tvs_file_options *options,
-                                tvs_frame_source *source) {
-  tvs_file_source *made = memory;
-  if (!memory || !options || !source) return TVS_ERR_NULL;
-  if (options->struct_size != sizeof *options) return TVS_ERR_STRUCT_SIZE;
+static tvs_status read_options(const tvs_file_options *given, tvs_file_options *options,
+                               tvs_imu_source *imu) {
+  tvs_status status;
+  tvs_file_options_init(options);
+  status = tvs_read_sized(given, TVS_SIZE_THROUGH(tvs_file_options, max_gap_ns), options,
+                          sizeof *options);
+  if (status != TVS_OK) return status;
   if (!options->read) return TVS_ERR_NULL;
   if (!(options->frames_per_second > 0 && options->frames_per_second <= 10000) ||
       options->clock_id == 0 || options->max_gap_ns < 0) {
     return TVS_ERR_ARGUMENT;
   }
-  if (options->imu && options->imu->struct_size != sizeof *options->imu) return TVS_ERR_STRUCT_SIZE;
+  memset(imu, 0, sizeof *imu);
+  return options->imu ? tvs_read_sized(options->imu, TVS_SIZE_THROUGH(tvs_imu_source, next), imu,
+                                       sizeof *imu)
+                      : TVS_OK;
+}
+
+tvs_status tvs_file_source_init_sized(void *memory, size_t size_bytes,
+                                      const tvs_file_options *options, tvs_frame_source *source,
+                                      size_t source_size) {
+  tvs_file_source *made = memory;
+  tvs_frame_source own = {0, memory, next_frame, release_frame};
+  tvs_file_options read;
+  tvs_imu_source imu;
+  tvs_status status;
+  if (!memory || !options || !source) return TVS_ERR_NULL;
+  status = read_options(options, &read, &imu);
+  if (status != TVS_OK) return status;
   if (size_bytes < sizeof *made) return TVS_ERR_CAPACITY;
   memset(made, 0, sizeof *made);
-  made->options = *options;
+  made->options = read;
+  made->imu = imu;
+  if (read.imu) made->options.imu = &made->imu;
   made->imu_device_ns = INT64_MIN;
-  source->struct_size = sizeof *source;
-  source->user = made;
-  source->next = next_frame;
-  source->release = release_frame;
+  tvs_write_sized(&own, sizeof own, source, source_size);
   return TVS_OK;
 }

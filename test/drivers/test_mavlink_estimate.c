@@ -773,6 +773,47 @@ static void test_a_session_that_listens_sends_nothing(void) {
   TEST_ASSERT_EQUAL_INT(0, num_sent);
 }
 
+/* ---- a caller with a newer header ---- */
+
+static void test_a_newer_callers_structs_are_read_and_written_whole(void) {
+  struct {
+    tvm_track known;
+    uint64_t more;
+  } newer_track;
+  struct {
+    tvm_estimate known;
+    uint64_t more;
+  } newer;
+  struct {
+    tv_odometry_state known;
+    uint64_t more;
+  } newer_state;
+  uint8_t bytes[TVM_MAX_PACKET_BYTES];
+  begin();
+  newer_state.known = state;
+  newer_state.known.struct_size = sizeof newer_state;
+  newer_state.more = 7; /* what a newer odometry writes and this library does not know */
+  newer_track.known = track;
+  newer_track.known.struct_size = sizeof newer_track;
+  newer_track.known.state = &newer_state.known;
+  newer_track.more = 0;
+  memset(&newer, 0xff, sizeof newer);
+  newer.known.struct_size = sizeof newer;
+  TEST_ASSERT_EQUAL_INT(TVS_OK, tvm_estimator_update(&estimator, &newer_track.known, &newer.known));
+  TEST_ASSERT_EQUAL_UINT32(sizeof newer, newer.known.struct_size);
+  TEST_ASSERT_EQUAL_UINT64(0, newer.more);
+  fill_estimate();
+  newer.known = estimate;
+  newer.known.struct_size = sizeof newer;
+  TEST_ASSERT_TRUE(tvm_estimate_pack(&newer.known, 1, 1, 197, 0, bytes) > 0);
+  newer.more = 1;
+  TEST_ASSERT_EQUAL_UINT(0, tvm_estimate_pack(&newer.known, 1, 1, 197, 0, bytes));
+  newer_track.more = 1;
+  ++newer_track.known.host_ns;
+  TEST_ASSERT_EQUAL_INT(TVS_ERR_STRUCT_SIZE,
+                        tvm_estimator_update(&estimator, &newer_track.known, &newer.known));
+}
+
 /* ---- bad arguments ---- */
 
 static void test_bad_arguments_are_refused_and_change_nothing(void) {
@@ -835,6 +876,7 @@ int main(void) {
   RUN_TEST(test_a_status_text_says_when_positions_end_and_why);
   RUN_TEST(test_the_autopilot_finds_no_offset_to_our_times);
   RUN_TEST(test_a_session_that_listens_sends_nothing);
+  RUN_TEST(test_a_newer_callers_structs_are_read_and_written_whole);
   RUN_TEST(test_bad_arguments_are_refused_and_change_nothing);
   return UNITY_END();
 }

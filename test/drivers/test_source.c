@@ -270,6 +270,85 @@ static void test_the_file_source(void) {
   free(memory);
 }
 
+/* ---- callers with the headers of other releases ---- */
+
+/* A caller whose structs have a field more. */
+typedef struct newer_options {
+  tvs_file_options known;
+  uint64_t more;
+} newer_options;
+
+typedef struct newer_frame {
+  tvs_frame known;
+  uint64_t more;
+} newer_frame;
+
+static void test_a_newer_callers_structs_are_read_and_written_whole(void) {
+  newer_options options;
+  newer_frame frame;
+  struct {
+    tvs_frame_source known;
+    uint64_t more;
+  } source;
+  void *memory = malloc(tvs_file_source_size());
+  memset(&options, 0xff, sizeof options);
+  memset(&source, 0xff, sizeof source);
+  memset(&frame, 0xff, sizeof frame);
+  tvs_file_options_init_sized(&options.known, sizeof options);
+  TEST_ASSERT_EQUAL_UINT32(sizeof options, options.known.struct_size);
+  TEST_ASSERT_EQUAL_UINT64(0, options.more);
+  options.known.read = read_picture;
+  options.known.frames_per_second = 10;
+  TEST_ASSERT_EQUAL_INT(TVS_OK,
+                        tvs_file_source_init_sized(memory, tvs_file_source_size(), &options.known,
+                                                   &source.known, sizeof source));
+  TEST_ASSERT_EQUAL_UINT32(sizeof source, source.known.struct_size);
+  TEST_ASSERT_EQUAL_UINT64(0, source.more);
+  frame.known.struct_size = sizeof frame;
+  TEST_ASSERT_EQUAL_INT(TVS_OK, source.known.next(source.known.user, &frame.known));
+  TEST_ASSERT_EQUAL_UINT32(sizeof frame, frame.known.struct_size);
+  TEST_ASSERT_TRUE(frame.known.image.data == pixels);
+  TEST_ASSERT_EQUAL_UINT64(0, frame.more);
+  options.more = 1; /* what this library does not know */
+  TEST_ASSERT_EQUAL_INT(TVS_ERR_STRUCT_SIZE, tvs_file_source_init(memory, tvs_file_source_size(),
+                                                                  &options.known, &source.known));
+  free(memory);
+}
+
+/* An older caller's struct ends before its guard. */
+static void test_an_older_callers_structs_are_not_written_beyond(void) {
+  const size_t older = offsetof(tvs_file_options, imu);
+  tvs_file_options options;
+  tvs_frame frame;
+  tvs_imu_source imu = {sizeof imu, NULL, next_imu};
+  tvs_frame_source source;
+  void *memory = malloc(tvs_file_source_size());
+  memset(&options, 0x5a, sizeof options);
+  tvs_file_options_init_sized(&options, older);
+  TEST_ASSERT_EQUAL_UINT32(older, options.struct_size);
+  TEST_ASSERT_EQUAL_DOUBLE(30, options.frames_per_second);
+  TEST_ASSERT_EACH_EQUAL_HEX8(0x5a, (const uint8_t *)&options + older, sizeof options - older);
+  /* No release had so small a struct, nor any of the sizes that follow. */
+  options.read = read_picture;
+  TEST_ASSERT_EQUAL_INT(TVS_ERR_STRUCT_SIZE,
+                        tvs_file_source_init(memory, tvs_file_source_size(), &options, &source));
+  tvs_file_options_init(&options);
+  options.read = read_picture;
+  options.frames_per_second = 10;
+  options.imu = &imu;
+  imu.struct_size = 8;
+  TEST_ASSERT_EQUAL_INT(TVS_ERR_STRUCT_SIZE,
+                        tvs_file_source_init(memory, tvs_file_source_size(), &options, &source));
+  options.imu = NULL;
+  TEST_ASSERT_EQUAL_INT(TVS_OK,
+                        tvs_file_source_init(memory, tvs_file_source_size(), &options, &source));
+  memset(&frame, 0, sizeof frame);
+  frame.struct_size = offsetof(tvs_frame, attitude);
+  TEST_ASSERT_EQUAL_INT(TVS_ERR_STRUCT_SIZE, source.next(source.user, &frame));
+  TEST_ASSERT_NULL(frame.image.data);
+  free(memory);
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_unwrapped_and_mapped_within_its_uncertainty);
@@ -282,5 +361,7 @@ int main(void) {
   RUN_TEST(test_slerp);
   RUN_TEST(test_euler_angles_turn_as_documented);
   RUN_TEST(test_the_file_source);
+  RUN_TEST(test_a_newer_callers_structs_are_read_and_written_whole);
+  RUN_TEST(test_an_older_callers_structs_are_not_written_beyond);
   return UNITY_END();
 }

@@ -35,8 +35,10 @@ typedef struct tvs_file_options {
   int64_t max_gap_ns;
 } tvs_file_options;
 
-/* Writes the defaults and struct_size to options, which may be null. */
-TV_API void tvs_file_options_init(tvs_file_options *options);
+/* Writes the defaults into a struct of struct_size bytes; null is allowed. */
+TV_API void tvs_file_options_init_sized(tvs_file_options *options, size_t struct_size);
+/* Writes the defaults; null is allowed. */
+#define tvs_file_options_init(options) tvs_file_options_init_sized((options), sizeof *(options))
 
 /* A file source in the caller's memory, about 57 kB, nearly all of it attitudes. Private. */
 typedef struct tvs_file_source tvs_file_source;
@@ -47,8 +49,12 @@ TV_API size_t tvs_file_source_size(void);
 /* Makes a source in `memory`, which the caller owns, and fills *source. The caller may hold any
    number of its frames at once. Returns TVS_ERR_NULL, TVS_ERR_STRUCT_SIZE, TVS_ERR_ARGUMENT,
    TVS_ERR_CAPACITY (too few bytes). */
-TV_API tvs_status tvs_file_source_init(void *memory, size_t size_bytes,
-                                       const tvs_file_options *options, tvs_frame_source *source);
+TV_API tvs_status tvs_file_source_init_sized(void *memory, size_t size_bytes,
+                                             const tvs_file_options *options,
+                                             tvs_frame_source *source, size_t source_size);
+/* tvs_file_source_init_sized with the size of the caller's struct. */
+#define tvs_file_source_init(memory, size_bytes, options, source) \
+  tvs_file_source_init_sized((memory), (size_bytes), (options), (source), sizeof *(source))
 
 TV_END_DECLS
 

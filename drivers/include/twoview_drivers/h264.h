@@ -12,7 +12,9 @@ TV_BEGIN_DECLS
    cropping gives; nothing is copied. Release all pictures, then close it with tvs_h264_close.
    Returns TVS_ERR_NULL, TVS_ERR_STATE (this libavcodec has no H.264 decoder), TVS_ERR_CAPACITY (no
    memory). */
-TV_API tvs_status tvs_h264_open(tvs_decoder *decoder);
+TV_API tvs_status tvs_h264_open_sized(tvs_decoder *decoder, size_t decoder_size);
+/* tvs_h264_open_sized with the size of the caller's struct. */
+#define tvs_h264_open(decoder) tvs_h264_open_sized((decoder), sizeof *(decoder))
 
 /* Closes a decoder that tvs_h264_open opened; null is allowed. */
 TV_API void tvs_h264_close(tvs_decoder *decoder);

@@ -1,4 +1,11 @@
-/* twoview drivers: what the functions of every driver return. */
+/* twoview drivers: what the functions of every driver return, and how their structs grow.
+
+   A struct that begins with struct_size may grow at its end within a soname. struct_size is that of
+   the caller's header: an init, and a function that fills a struct, is a macro over a function
+   ..._sized that is given the size; in a tvs_frame, tvs_imu, tvm_track and tvm_estimate the caller
+   sets it. A driver reads and writes no more than that, and takes an older header's struct with the
+   defaults for the rest. Who is handed a driver's struct (next, on_frame, on_imu) reads no field
+   beyond the struct_size in it. */
 #ifndef TWOVIEW_DRIVERS_STATUS_H
 #define TWOVIEW_DRIVERS_STATUS_H
 
@@ -19,7 +26,8 @@ typedef enum tvs_status {
   TVS_ERR_NULL = 16,
   /* A value is out of its documented range. */
   TVS_ERR_ARGUMENT = 17,
-  /* struct_size was not set, or it is the size in another version of the header. */
+  /* struct_size was not set, or the struct is of a newer header and uses what this library does not
+     know. */
   TVS_ERR_STRUCT_SIZE = 18,
   /* The caller's buffer or a queue is too small for this. */
   TVS_ERR_CAPACITY = 19,

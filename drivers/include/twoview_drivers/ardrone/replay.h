@@ -41,8 +41,11 @@ typedef struct ardrone_replay {
 /* Opens a folder that holds at least one of navdata.log and video.pave, and fills the transport,
    for a session with listen_only 1 and skip_to_latest 0. What the session sends is dropped. Returns
    TVS_ERR_NULL, TVS_ERR_ARGUMENT (a path of 4000 bytes and more), TVS_ERR_IO (neither file). */
-TV_API tvs_status ardrone_replay_open(ardrone_replay *replay, const char *folder,
-                                      ardrone_transport *transport);
+TV_API tvs_status ardrone_replay_open_sized(ardrone_replay *replay, const char *folder,
+                                            ardrone_transport *transport, size_t transport_size);
+/* ardrone_replay_open_sized with the size of the caller's struct. */
+#define ardrone_replay_open(replay, folder, transport) \
+  ardrone_replay_open_sized((replay), (folder), (transport), sizeof *(transport))
 
 /* Closes the files of a replay, which may be null. */
 TV_API void ardrone_replay_close(ardrone_replay *replay);
@@ -73,7 +76,11 @@ typedef struct ardrone_log {
    recording's host times; the drone's own stamps remove the network's jitter from them. Their
    clock_id is 1, and a larger one after each reboot or jump of the clock; a packet without
    ARDRONE_TAG_TIME gives 0. Returns TVS_ERR_NULL, TVS_ERR_IO (it does not open). */
-TV_API tvs_status ardrone_log_open(ardrone_log *log, const char *path, tvs_imu_source *source);
+TV_API tvs_status ardrone_log_open_sized(ardrone_log *log, const char *path, tvs_imu_source *source,
+                                         size_t source_size);
+/* ardrone_log_open_sized with the size of the caller's struct. */
+#define ardrone_log_open(log, path, source) \
+  ardrone_log_open_sized((log), (path), (source), sizeof *(source))
 /* Closes the file of a log, which may be null. */
 TV_API void ardrone_log_close(ardrone_log *log);
 

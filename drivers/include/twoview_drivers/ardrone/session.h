@@ -104,8 +104,12 @@ typedef struct ardrone_session_options {
   void (*on_frame)(void *user, const tvs_frame *frame);
 } ardrone_session_options;
 
-/* Writes the defaults and struct_size to options, which may be null. */
-TV_API void ardrone_session_options_init(ardrone_session_options *options);
+/* Writes the defaults into a struct of struct_size bytes; null is allowed. */
+TV_API void ardrone_session_options_init_sized(ardrone_session_options *options,
+                                               size_t struct_size);
+/* Writes the defaults; null is allowed. */
+#define ardrone_session_options_init(options) \
+  ardrone_session_options_init_sized((options), sizeof *(options))
 
 /* Writes to *size_bytes what a session with these options needs: about 1.2 MB, of which 1 MB is one
    whole video packet (none of it without `video`); 1 MB more with `recording`. Returns
@@ -178,11 +182,19 @@ TV_API void ardrone_session_counters(const ardrone_session *session, ardrone_cou
 
 /* Fills a frame source of source.h, which the steps supply. The caller may hold as many frames as
    the decoder allows. Returns TVS_ERR_NULL; TVS_ERR_STATE: the options have no decoder. */
-TV_API tvs_status ardrone_session_frames(ardrone_session *session, tvs_frame_source *source);
+TV_API tvs_status ardrone_session_frames_sized(ardrone_session *session, tvs_frame_source *source,
+                                               size_t source_size);
+/* ardrone_session_frames_sized with the size of the caller's struct. */
+#define ardrone_session_frames(session, source) \
+  ardrone_session_frames_sized((session), (source), sizeof *(source))
 
 /* Fills an IMU source of source.h, which the steps supply. It queues 64 samples; when there are
    more, the oldest is dropped. Returns TVS_ERR_NULL. */
-TV_API tvs_status ardrone_session_imu(ardrone_session *session, tvs_imu_source *source);
+TV_API tvs_status ardrone_session_imu_sized(ardrone_session *session, tvs_imu_source *source,
+                                            size_t source_size);
+/* ardrone_session_imu_sized with the size of the caller's struct. */
+#define ardrone_session_imu(session, source) \
+  ardrone_session_imu_sized((session), (source), sizeof *(source))
 
 /* This function and the next six call the pilot's function of the same name with the last step's
    time. Statuses as ardrone_pilot_take_off; also TVS_ERR_STATE when the link is not up

@@ -22,8 +22,11 @@ typedef struct ardrone_sockets {
    first step. `sockets` stays in place as long as the transport is used. The system chooses the
    local ports, so one computer can serve several drones. Navdata is accepted from the host's
    address only. Returns TVS_ERR_NULL, TVS_ERR_ARGUMENT (no such host). */
-TV_API tvs_status ardrone_sockets_init(ardrone_sockets *sockets, const char *host,
-                                       ardrone_transport *transport);
+TV_API tvs_status ardrone_sockets_init_sized(ardrone_sockets *sockets, const char *host,
+                                             ardrone_transport *transport, size_t transport_size);
+/* ardrone_sockets_init_sized with the size of the caller's struct. */
+#define ardrone_sockets_init(sockets, host, transport) \
+  ardrone_sockets_init_sized((sockets), (host), (transport), sizeof *(transport))
 
 /* Returns the present time of CLOCK_MONOTONIC, ns. */
 TV_API int64_t ardrone_now_ns(void);

@@ -93,8 +93,11 @@ typedef struct tvm_estimator_options {
   double drift_share, drift_turn_rad;
 } tvm_estimator_options;
 
-/* Writes the defaults and struct_size to options, which may be null. */
-TV_API void tvm_estimator_options_init(tvm_estimator_options *options);
+/* Writes the defaults into a struct of struct_size bytes; null is allowed. */
+TV_API void tvm_estimator_options_init_sized(tvm_estimator_options *options, size_t struct_size);
+/* Writes the defaults; null is allowed. */
+#define tvm_estimator_options_init(options) \
+  tvm_estimator_options_init_sized((options), sizeof *(options))
 
 /* A frame that was tracked. Fill all of it with zeros first. */
 typedef struct tvm_track {

@@ -135,8 +135,11 @@ typedef struct tvm_session_options {
   void (*on_event)(void *user, tvm_event event);
 } tvm_session_options;
 
-/* Writes the defaults and struct_size to options, which may be null. */
-TV_API void tvm_session_options_init(tvm_session_options *options);
+/* Writes the defaults into a struct of struct_size bytes; null is allowed. */
+TV_API void tvm_session_options_init_sized(tvm_session_options *options, size_t struct_size);
+/* Writes the defaults; null is allowed. */
+#define tvm_session_options_init(options) \
+  tvm_session_options_init_sized((options), sizeof *(options))
 
 /* A session in the caller's memory. Private. */
 typedef struct tvm_session tvm_session;
@@ -176,15 +179,22 @@ TV_API uint64_t tvm_session_num_invalid(const tvm_session *session);
    with velocity and height interpolated to its time where their neighbours are near enough. A
    sample comes when these neighbours are known, at most 150 ms late. The last 64 samples are kept.
    Returns TVS_ERR_NULL. */
-TV_API tvs_status tvm_session_imu(tvm_session *session, tvs_imu_source *source);
+TV_API tvs_status tvm_session_imu_sized(tvm_session *session, tvs_imu_source *source,
+                                        size_t source_size);
+/* tvm_session_imu_sized with the size of the caller's struct. */
+#define tvm_session_imu(session, source) \
+  tvm_session_imu_sized((session), (source), sizeof *(source))
 
 /* Fills *source with the frames of `camera`, each with the vehicle's attitude at its host time plus
    camera_offset_ns. `next` gives TVS_NONE while the sample that follows a frame has not come, at
    most hold_frame_ns. Times of the frames are then in the session's clock. `camera` is copied, must
    be valid as long as the session, and lends up to 8 frames more than the caller holds. Returns
    TVS_ERR_NULL, TVS_ERR_STRUCT_SIZE. */
-TV_API tvs_status tvm_session_frames(tvm_session *session, const tvs_frame_source *camera,
-                                     tvs_frame_source *source);
+TV_API tvs_status tvm_session_frames_sized(tvm_session *session, const tvs_frame_source *camera,
+                                           tvs_frame_source *source, size_t source_size);
+/* tvm_session_frames_sized with the size of the caller's struct. */
+#define tvm_session_frames(session, camera, source) \
+  tvm_session_frames_sized((session), (camera), (source), sizeof *(source))
 
 /* The attitude at host_ns of the session's clock, interpolated between two measured neighbours.
    sigma_rad includes by how much the vehicle turned within the uncertainty of the time. *time is

@@ -23,7 +23,11 @@ typedef struct tvm_udp {
      udpout://HOST:PORT                     sends to this address, and receives its answers.
    HOST is a name or an IPv4 address. Returns TVS_ERR_NULL; TVS_ERR_ARGUMENT: the text is not such
    an address, or there is no such host; TVS_ERR_STATE: another program has the port; TVS_ERR_IO. */
-TV_API tvs_status tvm_udp_open(tvm_udp *udp, const char *address, tvm_transport *transport);
+TV_API tvs_status tvm_udp_open_sized(tvm_udp *udp, const char *address, tvm_transport *transport,
+                                     size_t transport_size);
+/* tvm_udp_open_sized with the size of the caller's struct. */
+#define tvm_udp_open(udp, address, transport) \
+  tvm_udp_open_sized((udp), (address), (transport), sizeof *(transport))
 
 /* Closes the socket. Null and a closed one are no error. */
 TV_API void tvm_udp_close(tvm_udp *udp);
