@@ -114,7 +114,8 @@ void test_by_default_the_camera_is_as_given(void) {
   TEST_ASSERT_TRUE(contradicted > 10);  // what stayed was wrong
 }
 
-// The squared distance of the shift that was asked for from the true one, by its own covariance.
+// The squared Mahalanobis distance, under its stated covariance, of the shift that the matches ask
+// for from the true shift.
 double distance_sq(const tv_two_view& r, double dx, double dy) {
   const double* c = r.principal_point_asked_covariance;
   const double x = r.principal_point_asked_px[0] - dx, y = r.principal_point_asked_px[1] - dy;

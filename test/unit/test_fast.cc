@@ -219,7 +219,7 @@ int checkerboard(int x, int y) { return ((x / 9 + y / 9) & 1) * 255; }
 int single_dots(int x, int y) { return x % 11 == 5 && y % 10 == 4 ? 255 : 0; }
 int holes(int x, int y) { return 255 - single_dots(x, y); }
 int white(int, int) { return 255; }
-// The image has a step of 255, so that the score's extremes 0 and 254 both occur.
+// Neighbouring pixels differ by up to 255, so that both extremes of the score, 0 and 254, occur.
 int soft_squares(int x, int y) { return (x % 16 < 8 && y % 16 < 8 ? x * 37 + y * 11 : 0) & 255; }
 
 void test_corners_equal_the_definition_on_a_real_image() {

@@ -501,7 +501,7 @@ void test_drift_explains_a_loop_only_within_bounds() {
   }
   end.scale = 0.7;
   TEST_ASSERT_TRUE(tv::is_plausible(*odometry, frame, 10, end));
-  // Where the world of another segment lies says nothing.
+  // Another segment has coordinates of its own, so its distance does not make a loop implausible.
   odometry->segment = 1;
   end.cam_from_world = turned(1);
   TEST_ASSERT_TRUE(tv::is_plausible(*odometry, frame, 10, end));

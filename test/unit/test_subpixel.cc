@@ -101,7 +101,7 @@ void test_a_blobs_middle_is_found_below_a_pixel() {
 }
 
 // The maximum lies a little inside the wedge, by the same amount at every sub-pixel shift; so the
-// test compares shifts.
+// test compares the offsets at different shifts, not the positions.
 void test_a_wedge_that_moves_takes_its_corner_along() {
   uint64_t seed = 32;
   double sum_integer = 0, sum_refined = 0;

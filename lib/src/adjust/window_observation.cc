@@ -7,7 +7,7 @@ namespace tv {
 bool make_observation(const Camera& camera, const tv_observation& given, const double* plane,
                       WindowObservation* out) {
   if (!all_finite(given.pixel, 2)) return false;
-  const bool sphere = camera.model.model == TV_CAMERA_KANNALA_BRANDT;
+  const bool sphere = !has_image_plane(camera);
   const Vec2 given_pixel(given.pixel[0], given.pixel[1]);
   Vec3 ray;
   if (sphere) {

@@ -312,8 +312,8 @@ double brown_invert_radius(const Camera& camera, double distorted) {
 }
 
 // For pixels near the edge of the valid disc, or under strong distortion: Newton's method with step
-// halving, from the radial solution. The map is the gradient of a convex function on the disc, so
-// each Newton direction lowers the error.
+// halving, from the radial solution. The distortion is the gradient of a convex function on the
+// disc, so the error falls along each Newton step, if the step is short enough.
 bool brown_invert_safe(const Camera& camera, const Point2& target, double target_sq, Point2* out) {
   const double limit = camera.valid_radius_undistorted;
   const double length = std::sqrt(target_sq);

@@ -26,6 +26,12 @@ struct Camera {
   double valid_radius_distorted;
 };
 
+// Whether every ray that the lens sees meets the plane z = 1. Without one it may see what is beside
+// the camera and behind it, too.
+inline bool has_image_plane(const Camera& camera) {
+  return camera.model.model != TV_CAMERA_KANNALA_BRANDT;
+}
+
 // K and its inverse. K maps a point (x, y, 1) of the plane z = 1 to its pixel in the undistorted
 // image. inverse_intrinsics accepts any invertible matrix of the form [a 0 c; 0 b d; 0 0 1].
 Mat3 intrinsics_of(const tv_camera& camera);

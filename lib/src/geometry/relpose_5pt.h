@@ -9,7 +9,7 @@ namespace tv {
 inline constexpr int kMaxRelpose5pt = TVK_RELPOSE_MODELS;
 inline constexpr int kSamples5 = TVK_WIDTH;  // samples that one call solves
 
-// Five pairs of rays, of any positive length, of each sample.
+// The five pairs of rays of each sample. A ray may have any length above zero.
 struct Samples5 {
   double rays[30][kSamples5];
 };

@@ -37,8 +37,8 @@ bool add_keyframes(const Map& map, int32_t segment, int32_t begin, int32_t end, 
   return true;
 }
 
-// Adds points until each of the first views, which are free, sees enough of them, those first that
-// most keyframes see.
+// Adds points, those that most keyframes see before the others, until each free view (these come
+// first) sees enough of them.
 void add_shared_points(const Map& map, int32_t num_free, MapWindow* window) {
   const WindowSizes& sizes = window->sizes;
   const int32_t wanted =

@@ -23,8 +23,8 @@ bool is_contrary(const Odometry& odometry, const Frame& frame);
 // What the sensors say of a frame.
 void measure_reach(const Odometry& odometry, const Frame& frame, Reach* reach);
 
-// The frame follows the one before, at once or after a gap in which the camera may have gone
-// anywhere.
+// Adds the longest way that the camera may have gone since the frame before to most_m: by its
+// velocity; without a bound after a gap, or without a velocity.
 void add_reach(Odometry* odometry, const Frame& frame, bool gap);
 
 // Whether the sensors allow that a frame that was lost is where it was found. Places look alike.

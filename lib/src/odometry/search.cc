@@ -64,10 +64,8 @@ double depth_error_px(const Odometry& odometry, const MapPoint& point, const dou
   if (!(length > 0)) return 0;
   cross(ray, moved, across);
   const double shift = length_of(across) / length * static_cast<double>(point.depth_sigma);
-  // A fisheye lens sees points beside and behind it, too.
-  const tv_camera& model = odometry.camera.model;
-  const double depth = model.model == TV_CAMERA_KANNALA_BRANDT ? length_of(x) : x[2];
-  return std::min(model.fx * shift / std::max(depth, 1e-9), kLargestDepthError);
+  const double depth = has_image_plane(odometry.camera) ? x[2] : length_of(x);
+  return std::min(odometry.camera.model.fx * shift / std::max(depth, 1e-9), kLargestDepthError);
 }
 
 int32_t find_points(Odometry* odometry, const PointSearch& search, Frame* frame) {

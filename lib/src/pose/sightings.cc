@@ -120,7 +120,7 @@ bool set_pixel(const Camera& camera, const double* pixel, double sigma, Sighting
   Mat23 slope;
   if (!unproject(camera, Vec2(pixel[0], pixel[1]), &ray, nullptr)) return false;
   Vec3 axis = ray;
-  if (camera.model.model != TV_CAMERA_KANNALA_BRANDT) {
+  if (has_image_plane(camera)) {
     if (!(ray[2] > 1e-3)) return false;
     ray /= double(ray[2]);
     axis = Vec3(0, 0, 1);

@@ -11,8 +11,8 @@
 namespace tv {
 namespace {
 
-// The parameters: the pose's, then those of the cameras: the turn of view 0 and of view 1 while its
-// rows were exposed, in radians, and the principal point, in focal lengths.
+// The parameters, in this order: those of the pose; the turns of views 0 and 1 while their rows
+// were exposed, in radians; the shift of the principal point, in focal lengths.
 constexpr int kPose = PoseModel::kParameters, kTurns = 6, kCamera = kTurns + 2;
 constexpr int kAll = kPose + kCamera;
 

@@ -12,7 +12,8 @@ struct CameraMisfit {
   // By how much the pose would turn, and its direction move, with cameras that the matches do not
   // contradict; 0 where they do not contradict the given ones.
   double turn_rad = 0, direction_rad = 0;
-  // The largest standard deviation of the rotation about an axis without it; 0 where not tested.
+  // The largest standard deviation of the rotation about an axis before the misfit was added to the
+  // covariance; 0 where that function was not called.
   double given_turn_sigma_rad = 0;
 };
 

@@ -215,9 +215,8 @@ void prepare_matches(const TwoViewProblem& problem, Arena& arena, Matches* match
   const size_t n = static_cast<size_t>(problem.num);
   matches->order = arena_alloc<int32_t>(arena, n);
   for (int v = 0; v < 2; ++v) matches->sigmas[v] = problem.sigmas[v];
-  const bool on_plane =
-      !problem.calibrated || (problem.camera[0].model.model != TV_CAMERA_KANNALA_BRANDT &&
-                              problem.camera[1].model.model != TV_CAMERA_KANNALA_BRANDT);
+  const bool on_plane = !problem.calibrated ||
+                        (has_image_plane(problem.camera[0]) && has_image_plane(problem.camera[1]));
   matches->pairs = alloc_ray_pairs(arena, problem.num, on_plane);
   if (problem.kernels != nullptr) matches->pairs.kernels = problem.kernels;
   ArenaScope scope(arena);

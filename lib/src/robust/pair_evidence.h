@@ -56,7 +56,7 @@ struct Evidence : Support {
   double line_distance_px[2] = {kUnknown, kUnknown};
 };
 
-// What was measured of a camera before known points.
+// What was measured of one camera's pose from points whose places are known.
 struct AbsoluteEvidence : Support {
   bool has_pose = false;  // a pose has more inliers than chance explains
   // Of an attempt without a pose: the points of all matches lie on a line.

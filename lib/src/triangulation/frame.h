@@ -53,8 +53,4 @@ struct RayFrame {
 // ray must be a unit vector.
 RayFrame frame_of(const Camera& camera, const Vec3& ray);
 
-inline bool has_image_plane(const Camera& camera) {
-  return camera.model.model != TV_CAMERA_KANNALA_BRANDT;
-}
-
 }  // namespace tv

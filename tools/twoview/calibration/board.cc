@@ -392,9 +392,9 @@ void reject_blurred(std::vector<BoardView>& views) {
     if (view.is_used()) rises.push_back(view.edge_rise_px);
   if (rises.empty()) return;
   std::nth_element(rises.begin(), rises.begin() + rises.size() / 2, rises.end());
-  // A view is blurred above kMaxRiseOfMedian times the median: but not up to kMaxRisePx, since
-  // sharp views may differ by more than that ratio; and always above twice kMaxRisePx, since all
-  // views may be blurred.
+  // A view is blurred if its edges are wider than kMaxRiseOfMedian times the median; but never if
+  // they are at most kMaxRisePx wide, since sharp views may differ by more than that ratio; and
+  // always if they are wider than twice kMaxRisePx, since all views may be blurred.
   const double limit = std::max(kMaxRisePx, kMaxRiseOfMedian * rises[rises.size() / 2]);
   for (BoardView& view : views) {
     if (!view.is_used() || view.edge_rise_px <= std::min(limit, 2 * kMaxRisePx)) continue;
