@@ -2,8 +2,9 @@
 """Keeps the layers of docs/contributing.md: which folder of lib/src may include which, who may see
 Eigen, pixels, the heap and the internals at all, that no files include one another in a circle,
 that no sources of a folder call one another in one and no Python modules import one another in one,
-and that the rooms (folders) of tools/twoview include one another only as ROOMS allows. Reads the
-sources' text; prints each offence."""
+that what is installed of twoview_tools needs nothing of its laboratory, and that the rooms
+(folders) of tools/twoview include one another only as ROOMS allows. Reads the sources' text; prints
+each offence."""
 import posixpath
 import re
 import sys
@@ -302,6 +303,44 @@ def self_check():
         "lib/src/robust/d.h": []})
 
 
+def read_modules(folder):
+    """The text of each Python module below a folder, by dotted name."""
+    return {".".join(path.relative_to(folder).with_suffix("").parts): path.read_text()
+            for path in sorted(folder.rglob("*.py"))}
+
+
+def laboratory_offences(modules, cmake):
+    """Yields each import by which a module of twoview_tools that is installed needs one that is
+    not, and each module that the list of cmake, the text of tools/twoview/CMakeLists.txt, names in
+    vain."""
+    words = {name: re.search(rf"set\({name} ([^)]*)\)", cmake)[1].split()
+             for name in ("laboratory", "modules_of_verbs")}
+    listed = {"twoview_tools." + module.replace("/", ".") for module in words["modules_of_verbs"]}
+    edges = circles.imports(modules)
+
+    def is_installed(name):
+        return name in listed or name.split(".")[1] not in words["laboratory"]
+    needed = {target for name, targets in edges.items() if is_installed(name) for target in targets}
+    for name, targets in sorted(edges.items()):
+        for target in sorted(targets):
+            if is_installed(name) and not is_installed(target):
+                yield f"{name} is installed and imports {target} of the laboratory"
+    for name in sorted(listed - needed):
+        if name not in modules or not name.endswith(".__init__"):
+            yield f"{name} is installed, and no verb imports it"
+
+
+def laboratory_self_check():
+    """Each offence must be found: a module of the laboratory that a verb needs, and one in vain."""
+    modules = {"twoview_tools.compare.cli": "from ..accuracy import tables",
+               "twoview_tools.accuracy.__init__": "", "twoview_tools.accuracy.tables": "",
+               "twoview_tools.accuracy.cli": "from . import tables"}
+    cmake = "set(laboratory accuracy)\nset(modules_of_verbs accuracy/__init__ accuracy/tables)"
+    assert not list(laboratory_offences(modules, cmake))
+    assert len(list(laboratory_offences(modules, cmake.replace(" accuracy/tables", "")))) == 1
+    assert len(list(laboratory_offences(modules, cmake[:-1] + " accuracy/cli)"))) == 1
+
+
 def code_circles(root):
     """Yields each circle of sources that call each other and of Python modules."""
     sources = {path.relative_to(root).as_posix(): path.read_text()
@@ -310,9 +349,7 @@ def code_circles(root):
     for circle in circles.circles_of(circles.calls(sources)):
         yield "a circle of files: " + " calls ".join(circle)
     for top in ("tools/python", "python"):
-        modules = {".".join(path.relative_to(root / top).with_suffix("").parts): path.read_text()
-                   for path in sorted((root / top).rglob("*.py"))}
-        for circle in circles.circles_of(circles.imports(modules)):
+        for circle in circles.circles_of(circles.imports(read_modules(root / top))):
             yield "a circle of modules: " + " imports ".join(circle)
 
 
@@ -320,11 +357,14 @@ def main():
     self_check()
     rooms_self_check()
     circles.self_check()
+    laboratory_self_check()
     root = Path(sys.argv[1])
     files = read_includes(root)
     if not any(name.startswith("lib/src/") for name in files):
         sys.exit(f"no sources under {sys.argv[1]}/lib/src")
-    found = [*offences(files), *room_offences(files), *code_circles(root)]
+    cmake = (root / "tools/twoview/CMakeLists.txt").read_text()
+    found = [*offences(files), *room_offences(files), *code_circles(root),
+             *laboratory_offences(read_modules(root / "tools/python"), cmake)]
     for offence in found:
         print(offence)
     print(f"{len(files)} files, {len(found)} offences")

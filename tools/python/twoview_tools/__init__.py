@@ -11,6 +11,10 @@
 - odometry: visual odometry over sequences, rendered flights and faults (scripts/odometry).
 - docs: what builds and checks the documentation (scripts/docs, test/docs).
 
+compare, bags, colmap and to_rerun are verbs of the program and are installed. accuracy, odometry,
+room, paper and docs are the project's laboratory and are not, but for the modules that the verbs
+take: modules_of_verbs in tools/twoview/CMakeLists.txt.
+
 `scripts/python -m twoview_tools.accuracy.tune` runs a module of the source tree. The tests get the
 same path from test/CMakeLists.txt, and the programs of tools/compare_colmap from their
 launch.py.
