@@ -248,7 +248,9 @@ def judge(entry: str, value: Any, refused: list[str], left_out: list[str]) -> No
 def refuse(refused: Sequence[str], where: str) -> None:
     if refused:
         raise FormatError(f"{where}: {refused[0]} is not understood, and may concern the lens or "
-                          "the size: see docs/formats.md, or remove it if it does not")
+                          "the size: see docs/formats.md, or remove it if it does not" +
+                          (" (the scale of depth pictures, as Replica's?)"
+                           if plain(refused[0]) == "scale" else ""))
 
 
 class Found(NamedTuple):

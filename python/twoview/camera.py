@@ -174,7 +174,8 @@ def exchanged(size: Sequence[int], K: Sequence[float]) -> str:
     is_x_far, is_y_far = (off > FAR_FROM_MIDDLE for off in off_middle(cx, cy))
     question = ""
     if is_x_far and is_y_far and is_middle(cy, cx):
-        question = "are cx and cy exchanged, or is this camera of a turned picture?"
+        question = ("are cx and cy exchanged, is this camera of a turned picture, or its size "
+                    "[rows, columns] (MATLAB's)?")
     elif is_same(fx, fy, OTHER_FOCAL):
         pass
     elif (is_x_far or is_y_far) and is_middle(fx, fy) and cy and is_same(cx, cy, SAME_FOCAL):

@@ -372,7 +372,14 @@ def _refuse_by_name(root: Mapping[str, Any], name: str) -> None:
         if any("projection_type" in item for item in items) else
         "OpenMVG's or AliceVision's scene" if "sfm_data_version" in root or (
             isinstance(intrinsics, list) and any(isinstance(i, dict) for i in intrinsics)) else
-        "KITTI's calibration" if {"P0", "K_00", "P_rect_00"} & set(root) else "")
+        "KITTI's calibration" if {"P0", "K_00", "P_rect_00"} & set(root) else
+        "DepthAI's calibration of an OAK, each of whose cameras has an intrinsicMatrix, a "
+        "distortionCoeff, a width and a height" if "cameraData" in root else
+        "Project Aria's calibration, whose lens models are not ours: undistort its pictures with "
+        "its own tools, as of a pinhole" if {"ModelName", "Params"} <= set(root) else
+        "MATLAB's camera, whose ImageSize is [rows, columns] and whose first pixel is (1, 1), not "
+        "(0, 0); RadialDistortion is k1 k2 (k3), TangentialDistortion p1 p2"
+        if "RadialDistortion" in root else "")
     if other:
         raise FormatError(f"{name}: {other}; {_WRITE_OURS}")
 
@@ -402,10 +409,21 @@ def _refuse_text_by_name(text: str, name: str) -> None:
     is_dso = bool(first) and first[0] in ("Pinhole", "RadTan", "FOV", "EquiDistant", "ATAN",
                                           "KannalaBrandt")
     numbers = [word for word in first if re.fullmatch(r"[-+0-9.eE]+", word)]
-    if is_dso and len(first) > 1 or len(first) >= 3 and len(numbers) == len(first):
-        raise FormatError(f"{name}: numbers without names: a matrix alone, or a camera of DSO, "
-                          "LSD-SLAM or PTAM (tum_ardrone), whose numbers may be relative to the "
-                          "picture's size; " + _WRITE_OURS)
+    unnumbered = re.match(r"(?:(?!\d+ )\S+ )?([A-Z]+(?:_[A-Z0-9]+)* \d+ \d+) \S+ \S",
+                          " ".join(first))
+    if unnumbered:
+        raise FormatError(f"{name}: a line of COLMAP's cameras.txt begins with the camera's "
+                          f"number: 1 {unnumbered[1]} ...")
+    is_dso = is_dso and len(first) > 1
+    if not is_dso and (len(first) < 3 or len(numbers) < len(first)):
+        return
+    what = ("a camera of DSO, whose numbers may be relative to the picture's size" if is_dso else
+            "a matrix alone (ScanNet's intrinsics?), without the picture's size"
+            if len(first) in (3, 4) else
+            "width, height, fx, fy, cx, cy, as of ARKitScenes' .pincam?" if len(first) == 6 else
+            "a camera of DSO, LSD-SLAM or PTAM (tum_ardrone)? Their numbers may be relative to "
+            "the picture's size")
+    raise FormatError(f"{name}: numbers without names: {what}; {_WRITE_OURS}")
 
 
 def _svo(root: Mapping[str, Any], name: str, read: _Read) -> bool:

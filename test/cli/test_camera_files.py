@@ -224,6 +224,9 @@ class CameraFiles(cli.CliTest):
                                     f"{2 * WIDTH}x{2 * HEIGHT}", "--scale-camera", out=out)
                 self.assert_refused(run("--camera", wide, "--scale-camera"), "does not help",
                                     out=out)
+                if verb == "odometry":
+                    self.assert_refused(run("--scale-camera"), "--scale-camera is for --camera",
+                                        "cameras.yaml", out=out)
                 done = run("--camera", large, "--scale-camera")
                 self.assertNotEqual(done.returncode, 2, done.stderr)
                 if verb == "reconstruct":

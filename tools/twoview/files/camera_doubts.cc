@@ -32,7 +32,8 @@ const char* exchanged(const tv_camera& camera) {
   const bool is_x_far = share_off_middle(cx, camera.width) > kFarFromMiddle;
   const bool is_y_far = share_off_middle(cy, camera.height) > kFarFromMiddle;
   if (is_x_far && is_y_far && is_middle(cy, cx))
-    return "are cx and cy exchanged, or is this camera of a turned picture?";
+    return "are cx and cy exchanged, is this camera of a turned picture, or its size [rows, "
+           "columns] (MATLAB's)?";
   if (difference(fx, fy) <= kOtherFocal) return nullptr;
   if ((is_x_far || is_y_far) && is_middle(fx, fy) && difference(cx, cy) <= kSameFocal)
     return "are fx and cx, fy and cy exchanged?";

@@ -645,9 +645,11 @@ std::vector<std::string> CameraEntries::left_out() const {
   std::vector<std::string> found;
   const std::vector<std::string> bad = refused(found);
   if (!bad.empty())
-    throw BadInput(where_ + ": " + bad[0] +
-                   " is not understood, and may concern the lens or the size: see "
-                   "docs/formats.md, or remove it if it does not");
+    throw BadInput(
+        where_ + ": " + bad[0] +
+        " is not understood, and may concern the lens or the size: see "
+        "docs/formats.md, or remove it if it does not" +
+        (plain_name(bad[0]) == "scale" ? " (the scale of depth pictures, as Replica's?)" : ""));
   return found;
 }
 

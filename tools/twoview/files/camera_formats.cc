@@ -371,6 +371,16 @@ std::string other_format(const YAML::Node& root) {
                                     [](const auto& item) { return item.IsMap(); });
   if (root["sfm_data_version"] || has_maps) return "OpenMVG's or AliceVision's scene";
   if (root["P0"] || root["K_00"] || root["P_rect_00"]) return "KITTI's calibration";
+  if (root["cameraData"])
+    return "DepthAI's calibration of an OAK, each of whose cameras has an intrinsicMatrix, a "
+           "distortionCoeff, a width and a height";
+  if (root["ModelName"] && root["Params"])
+    return "Project Aria's calibration, whose lens models are not ours: undistort its pictures "
+           "with "
+           "its own tools, as of a pinhole";
+  if (root["RadialDistortion"])
+    return "MATLAB's camera, whose ImageSize is [rows, columns] and whose first pixel is (1, 1), "
+           "not (0, 0); RadialDistortion is k1 k2 (k3), TangentialDistortion p1 p2";
   return "";
 }
 
@@ -430,11 +440,25 @@ void refuse_text_by_name(const std::string& text, const std::string& path) {
       first.size() >= 3 && std::all_of(first.begin(), first.end(), [](const std::string& word) {
         return word.find_first_not_of("-+0123456789.eE") == std::string::npos;
       });
-  if (is_dso || is_numbers)
-    throw BadInput(path +
-                   ": numbers without names: a matrix alone, or a camera of DSO, LSD-SLAM or PTAM "
-                   "(tum_ardrone), whose numbers may be relative to the picture's size; " +
-                   kWriteOurs);
+  for (size_t k = 0; k < 2 && k + 4 < first.size(); ++k) {
+    static const std::regex model("[A-Z]+(_[A-Z0-9]+)*");
+    const auto is_side = [](const std::string& word) {
+      return word.find_first_not_of("0123456789") == std::string::npos;
+    };
+    if (k == 1 && is_side(first[0])) break;
+    if (std::regex_match(first[k], model) && is_side(first[k + 1]) && is_side(first[k + 2]))
+      throw BadInput(path + ": a line of COLMAP's cameras.txt begins with the camera's number: 1 " +
+                     first[k] + " " + first[k + 1] + " " + first[k + 2] + " ...");
+  }
+  if (!is_dso && !is_numbers) return;
+  const std::string what =
+      is_dso ? "a camera of DSO, whose numbers may be relative to the picture's size"
+      : first.size() == 3 || first.size() == 4
+          ? "a matrix alone (ScanNet's intrinsics?), without the picture's size"
+      : first.size() == 6 ? "width, height, fx, fy, cx, cy, as of ARKitScenes' .pincam?"
+                          : "a camera of DSO, LSD-SLAM or PTAM (tum_ardrone)? Their numbers may be "
+                            "relative to the picture's size";
+  throw BadInput(path + ": numbers without names: " + what + "; " + kWriteOurs);
 }
 
 // ---- any format --------------------------------------------------------------------------------

@@ -543,6 +543,10 @@ int odometry(Arguments& a) {
   a.flight.odometry.correct_camera = a.keeps_camera ? 0 : 1;
   if (a.flight.focal_35mm != 0 && !a.camera.empty())
     throw BadInput("--focal-35mm is for films and photographs without a camera file");
+  if (a.flight.scales_camera && a.camera.empty())
+    throw BadInput(
+        "--scale-camera is for --camera: for a camera that the source has itself, give its file "
+        "there, such as the folder's cameras.yaml");
   const std::unique_ptr<FrameSource> source = open_source(a);
 #ifdef TWOVIEW_HAS_ROOM
   if (a.makes_room && !source->can_run_again())
