@@ -334,7 +334,9 @@ RoomSource room_source_of_colmap(const std::string& model, const std::string& pi
             [](const RoomView& a, const RoomView& b) { return a.index < b.index; });
   made.scene.views = std::move(views);
   made.poses_file = file("images.txt");
-  made.scene.points = read_colmap_points(file("points3D.txt"));
+  // A model of poses alone has no file of points: they are found by matching then.
+  if (std::error_code error; fs::exists(file("points3D.txt"), error))
+    made.scene.points = read_colmap_points(file("points3D.txt"));
   for (const char* name : {"cameras.txt", "images.txt", "points3D.txt"})
     made.files.push_back(file(name));
   return made;
