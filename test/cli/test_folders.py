@@ -5,6 +5,7 @@ import struct
 
 from cli_support import CliTest, camera_yaml, main, png
 from test_odometry import COUNT, FPS, HEIGHT, LUMA, PICTURES, TIMES, TUM_TRUTH, WIDTH
+from test_photographs import ASCII, exif, with_exif
 
 HIDDEN = "is a hidden file (its name begins with a dot)"
 
@@ -140,14 +141,53 @@ class Folders(CliTest):
             "place): they are taken as evenly spaced in time; where some are missing, list the "
             "times in frames.txt"])
 
-    def test_a_counter_that_began_anew_is_named(self):
-        self.fill()
-        for i in range(1, COUNT + 1):
-            (self.folder / f"frames/frame{i}.png").rename(
-                self.folder / f"frames/DSC_{(9992 + i - 1) % 9999 + 1:04}.png")
-        self.assertIn(
-            "the pictures' counter seems to have begun anew after DSC_9999.png: DSC_9993.png and",
-            self.track()["notes"][0])
+    def test_a_counter_that_began_anew_goes_on(self):
+        # Each second of EXIF has two pictures, also that in which it began anew.
+        names = [f"DSC_{(9992 + i - 1) % 9999 + 1:04}.png" for i in range(COUNT)]
+        self.refill(names, [10 + i // 2 for i in range(COUNT)])
+        self.assertLess(self.track()["truth"]["ate_rmse_percent_of_path"], 1)
+        self.assertEqual(self.names(), names)
+        self.assertEqual(self.result()["notes"], [
+            "the pictures are taken in the order of their counter, which began anew, in which "
+            "neighbours look alike, and not of the numbers in their names: DSC_0001.png behind "
+            "DSC_9999.png, not as the first"])
+
+    def refill(self, names, times=()):
+        """The pictures under these names, with these times of EXIF, in seconds."""
+        shutil.rmtree(self.folder / "frames", ignore_errors=True)
+        for i, (name, data) in enumerate(zip(names, PICTURES)):
+            if times:
+                time = (0x9003, ASCII, f"2026:01:01 12:00:{times[i]:02}")
+                data = with_exif(data, exif(time=time))
+            self.write(f"frames/{name}", data)
+        return list(names)
+
+    def test_names_that_do_not_sort_as_numbers_are_read_by_what_the_pictures_show(self):
+        half = COUNT // 2
+        for names, by in (
+                ([f"{i + 5:x}.png" for i in range(COUNT)], "counters with letters"),
+                ([f"{'31-12-2025' if i < half else '01-01-2026'}_{i:02}.png"
+                  for i in range(COUNT)], "(day, month, year)")):
+            with self.subTest(first=names[:2]):
+                self.refill(names)
+                result = self.track()
+                self.assertEqual(self.names(), names)
+                self.assertIn(by, result["notes"][0])
+                self.assertEqual(len(result["notes"]), 1)
+
+    def test_exif_times_that_the_pictures_refute_are_not_heeded(self):
+        names = self.refill([f"{i:02}.png" for i in range(COUNT)],
+                            [30 if i == 6 else 10 + i for i in range(COUNT)])
+        self.assertEqual(self.track()["notes"], [])
+        self.assertEqual(self.names(), names)
+
+    def test_orders_that_the_pictures_leave_open_are_named(self):
+        for i in range(6):  # equal pictures
+            time = (0x9003, ASCII, f"2026:01:01 12:00:{20 - i}")
+            data = with_exif(PICTURES[0], exif(time=time))
+            self.write(f"frames/{i}.png", data)
+        self.run_program("odometry", "frames", "-o", self.out, "--fps", FPS, "--focal-35mm", 30)
+        self.assertIn("4.png behind 5.png, not behind 3.png by these", self.result()["notes"][0])
 
     def test_one_picture_is_no_film(self):
         self.fill()

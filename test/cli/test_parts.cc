@@ -18,6 +18,7 @@
 #include "files/camera_set.h"
 #include "files/image_header.h"
 #include "files/matches_file.h"
+#include "files/name_dates.h"
 #include "files/pairs_file.h"
 #include "odometry/flight.h"
 #include "odometry/outputs.h"
@@ -967,6 +968,27 @@ void test_a_frame_found_afterwards_is_where_the_camera_can_have_flown(void) {
   TEST_ASSERT_TRUE(reach.contains(7, 0, {0.3, 0, 0}));
 }
 
+void check_sortable(const char* name, DateReading reading, const char* sortable) {
+  static char found[80];
+  const std::vector<std::string> names = sortable_names({name}, reading);
+  std::snprintf(found, sizeof found, "%s", names.empty() ? "none" : names[0].c_str());
+  TEST_ASSERT_EQUAL_STRING(sortable, found);
+}
+
+void test_dates_and_times_of_names_are_written_so_that_they_sort() {
+  check_sortable("31-12-2025_1.jpg", DateReading::kDayMonth, "2025-12-31_1.jpg");
+  check_sortable("31-12-2025_1.jpg", DateReading::kMonthDay, "none");  // no month 31
+  check_sortable("IMG01022026.jpg", DateReading::kMonthDay, "img2026-01-02.jpg");
+  check_sortable("5.6.26 a.jpg", DateReading::kDayMonthTwo, "26-06-05 a.jpg");
+  check_sortable("Photo 1.05.09 PM.jpg", DateReading::kDayMonth, "photo 13.05.09.jpg");
+  check_sortable("12-59 a.m.png", DateReading::kDayMonth, "00-59.png");
+  check_sortable("Sept 3.png", DateReading::kDayMonth, "09 3.png");
+  check_sortable("5 Jan 2026 x.png", DateReading::kDayMonth, "2026-01-05 x.png");
+  check_sortable("2026-01-05_120000.jpg", DateReading::kDayMonth, "none");  // sorts as it is
+  check_sortable("frame_000123.png", DateReading::kMonthDayTwo, "none");
+  check_sortable("marble_12am3.png", DateReading::kDayMonth, "marble_003.png");
+}
+
 // Bit n of the first number: picture n of a sequence counts as given again while the camera moved;
 // of the second: the camera waited. Each picture is one level, so that levels are positions.
 struct Repeated {
@@ -1003,6 +1025,7 @@ void test_a_picture_that_stands_is_told_from_a_camera_that_does() {
 
 int main() {
   UNITY_BEGIN();
+  RUN_TEST(test_dates_and_times_of_names_are_written_so_that_they_sort);
   RUN_TEST(test_a_picture_that_stands_is_told_from_a_camera_that_does);
   RUN_TEST(test_a_clock_that_falls_and_rises_again_began_anew);
   RUN_TEST(test_a_truth_with_the_other_order_of_its_quaternions_is_told_from_the_right_one);

@@ -12,7 +12,7 @@ from test_bad_input import JPEG
 
 FOCAL_35MM = 32  # a whole number, as EXIF has it
 FOCAL_PX = FOCAL_35MM * math.hypot(WIDTH, HEIGHT) / math.hypot(36, 24)
-SHORT, LONG, RATIONAL, SRATIONAL, FLOAT, DOUBLE = 3, 4, 5, 10, 11, 12
+ASCII, SHORT, LONG, RATIONAL, SRATIONAL, FLOAT, DOUBLE = 2, 3, 4, 5, 10, 11, 12
 
 
 def exif(order="<", orientation=None, **tags):
@@ -38,9 +38,13 @@ def exif(order="<", orientation=None, **tags):
             field = struct.pack(order + "f", value)
         elif kind == SHORT:
             field = struct.pack(order + "HH", value, 0)
+        elif kind == ASCII:
+            field = struct.pack(order + "I", data_at + len(extra))
+            extra += value.encode() + b"\0"
         else:
             field = struct.pack(order + "I", value)
-        entries += struct.pack(order + "HHI", tag, kind, 1) + field
+        count = len(value) + 1 if kind == ASCII else 1
+        entries += struct.pack(order + "HHI", tag, kind, count) + field
     return (head + struct.pack(order + "I", 8)
             + struct.pack(order + "H", 1 + bool(of_image)) + of_image
             + struct.pack(order + "HHIII", 0x8769, LONG, 1, first, 0)

@@ -153,7 +153,35 @@ ExifFocal combined(double of_film, double of_sensor, double zoom) {
   return found;
 }
 
+// A tag's text without what stands behind its end; empty where it is none.
+std::string text_of(ExifData* data, ExifTag tag) {
+  ExifEntry* const entry = exif_content_get_entry(data->ifd[EXIF_IFD_EXIF], tag);
+  if (!entry || !entry->data || entry->format != EXIF_FORMAT_ASCII) return "";
+  const std::string text(reinterpret_cast<const char*>(entry->data), entry->size);
+  return text.substr(0, text.find('\0'));
+}
+
 }  // namespace
+
+double exif_time_s(std::string_view bytes) {
+  const Data data = parsed(bytes);
+  if (!data) return 0;
+  int year = 0, month = 0, day = 0, hour = 0, minute = 0, second = 0;
+  const std::string text = text_of(data.get(), EXIF_TAG_DATE_TIME_ORIGINAL);
+  if (std::sscanf(text.c_str(), "%4d:%2d:%2d %2d:%2d:%2d", &year, &month, &day, &hour, &minute,
+                  &second) != 6 ||
+      year < 1900 || month < 1 || month > 12 || day < 1 || day > 31)
+    return 0;
+  // Days of months that all have 31: only the order and differences within a day count.
+  const double days = day + 31.0 * (month + 12.0 * year);
+  double fraction = 0, unit = 0.1;
+  for (const char c : text_of(data.get(), EXIF_TAG_SUB_SEC_TIME_ORIGINAL)) {
+    if (c < '0' || c > '9') break;
+    fraction += unit * (c - '0');
+    unit /= 10;
+  }
+  return ((days * 24 + hour) * 60 + minute) * 60 + second + fraction;
+}
 
 std::string focal_option(const ExifFocal& exif) {
   if (!(exif.focal_35mm > 0) || !exif.doubt.empty()) return "--focal-35mm";

@@ -32,4 +32,8 @@ std::string focal_option(const ExifFocal& exif);
 // or 270; 0 where it is not said. It never fails.
 int exif_turn_deg(std::string_view bytes);
 
+// When the picture was taken: DateTimeOriginal with SubSecTimeOriginal, in seconds of a calendar
+// whose zero has no meaning; 0 where it is not said. It never fails.
+double exif_time_s(std::string_view bytes);
+
 }  // namespace cli

@@ -145,28 +145,37 @@ bool is_all_nines(int64_t number) {
   return last == number;
 }
 
-}  // namespace
-
-std::string jump_words(const std::vector<std::string>& names) {
-  const std::vector<int64_t> counters = counters_of(names);
+// Where the steps between these numbers are above the usual one.
+std::vector<size_t> jumps_of(const std::vector<int64_t>& counters) {
   std::vector<int64_t> steps;
   for (size_t k = 1; k < counters.size(); ++k) steps.push_back(counters[k] - counters[k - 1]);
-  if (steps.empty()) return "";
+  std::vector<size_t> jumps;
+  if (steps.empty()) return jumps;
   std::vector<int64_t> sorted = steps;
   std::nth_element(sorted.begin(), sorted.begin() + sorted.size() / 2, sorted.end());
-  const int64_t usual = sorted[sorted.size() / 2];
-  const auto is_jump = [&](int64_t step) {
-    return static_cast<double>(step) > kJump * static_cast<double>(usual);
-  };
-  const auto first = std::find_if(steps.begin(), steps.end(), is_jump);
-  if (usual < 1 || first == steps.end()) return "";
-  const auto k = static_cast<size_t>(first - steps.begin());
-  const auto count = std::count_if(steps.begin(), steps.end(), is_jump);
-  if (count == 1 && counters.front() <= 1 && is_all_nines(counters.back()))
+  const auto usual = static_cast<double>(sorted[sorted.size() / 2]);
+  for (size_t k = 0; k < steps.size() && usual >= 1; ++k)
+    if (static_cast<double>(steps[k]) > kJump * usual) jumps.push_back(k + 1);
+  return jumps;
+}
+
+}  // namespace
+
+size_t begun_anew_at(const std::vector<std::string>& names) {
+  const std::vector<int64_t> counters = counters_of(names);
+  const std::vector<size_t> jumps = jumps_of(counters);
+  return jumps.size() == 1 && counters.front() <= 1 && is_all_nines(counters.back()) ? jumps[0] : 0;
+}
+
+std::string jump_words(const std::vector<std::string>& names) {
+  const std::vector<size_t> jumps = jumps_of(counters_of(names));
+  if (jumps.empty()) return "";
+  const size_t k = jumps[0], count = jumps.size();
+  if (begun_anew_at(names) > 0)
     return "the pictures' counter seems to have begun anew after " + names.back() + ": " +
-           names[k + 1] + " and what follows it then come before " + names.front() +
-           ", but were taken after " + names[k] + ": rename them";
-  return "the numbers of the pictures' names jump from " + names[k] + " to " + names[k + 1] +
+           names[k] + " and what follows it then come before " + names.front() +
+           ", but were taken after " + names[k - 1] + ": rename them";
+  return "the numbers of the pictures' names jump from " + names[k - 1] + " to " + names[k] +
          (count > 1 ? " (and in " + std::to_string(count - 1) +
                           (count > 2 ? " more places)" : " more place)")
                     : "") +
@@ -174,12 +183,16 @@ std::string jump_words(const std::vector<std::string>& names) {
          "frames.txt";
 }
 
-cv::Size header_size(const std::string& path) {
+std::string picture_head(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   std::string head(kHeaderBytes, '\0');
   file.read(head.data(), static_cast<std::streamsize>(head.size()));
   head.resize(static_cast<size_t>(file.gcount()));
-  const ImageHeader header = read_image_header(head);
+  return head;
+}
+
+cv::Size header_size(const std::string& path) {
+  const ImageHeader header = read_image_header(picture_head(path));
   const auto is_side = [](int64_t side) { return side > 0 && side <= INT32_MAX; };
   if (!is_side(header.width) || !is_side(header.height)) return {};
   return {static_cast<int>(header.width), static_cast<int>(header.height)};

@@ -41,6 +41,13 @@ bool has_picture_ending(const std::filesystem::path& path);
 // A line where the numbers of a sequence's names jump, so that pictures may be missing; else empty.
 std::string jump_words(const std::vector<std::string>& names);
 
+// The place in a sequence's names at which a camera's counter jumps that seems to have begun anew
+// after 9999: what stands from there on was taken before the rest. 0: nowhere.
+size_t begun_anew_at(const std::vector<std::string>& names);
+
+// The first bytes of a picture's file, in which its size and its EXIF data stand.
+std::string picture_head(const std::string& path);
+
 // The size in pixels by the file's header; 0x0 where it does not tell.
 cv::Size header_size(const std::string& path);
 

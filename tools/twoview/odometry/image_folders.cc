@@ -15,6 +15,7 @@
 #include "files/folder.h"
 #include "files/image_file.h"
 #include "files/mixed_names.h"
+#include "files/sequence_order.h"
 #include "files/yaml_values.h"
 #include "odometry/frames.h"
 #include "odometry/measurements.h"
@@ -382,14 +383,19 @@ std::unique_ptr<FrameSource> open_image_folder(const std::string& path, double f
     if (!(fps > 0)) throw BadInput("--fps is required: " + path + " holds images without times");
     for (const std::string& name : names) folder.frames.push_back({0, name, ""});
     leave_out_other_sizes(folder, false);
-    for (size_t k = 0; k < folder.frames.size(); ++k)
-      folder.frames[k].time_s = static_cast<double>(k) / fps;
     std::vector<std::string> kept;
     for (const Listed& listed : folder.frames) kept.push_back(listed.name);
     if (const std::string kinds = mixed_names(kept); is_sequence && !kinds.empty())
       throw BadInput(path + " holds pictures with the same numbers " + kinds +
                      ": of several cameras or takes, or copies? Give those of one, in a folder of "
                      "their own");
+    if (is_sequence) {
+      SequenceOrder order = sequence_order(root, kept);
+      kept = std::move(order.names);
+      add_note(folder, order.note);
+    }
+    for (size_t k = 0; k < kept.size(); ++k)
+      folder.frames[k] = {static_cast<double>(k) / fps, kept[k], ""};
     add_note(folder, jump_words(kept));
     add_note(folder, pictures.note);
     add_cameras(folder);
