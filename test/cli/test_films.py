@@ -193,6 +193,17 @@ class Films(CliTest):
                 self.assert_refused(self.odometry(path, "--focal-35mm", 26), "film.mov", *words)
         self.assert_right(self.track(mov(PICTURES, TIMES, more=full(b"st3d", b"\0"))))
 
+    def test_a_film_with_two_eyes_in_its_pictures_is_doubtful(self):
+        def beside(a, b):
+            rows = range(0, WIDTH * HEIGHT, WIDTH)
+            return png(2 * WIDTH, HEIGHT, b"".join(a[y:y + WIDTH] + b[y:y + WIDTH] for y in rows))
+        film = mov([beside(a, b) for a, b in zip(LUMA, LUMA[2:])], TIMES[:-2])
+        done = self.succeed(self.odometry(self.write("film.mov", film), "--focal-35mm", 21,
+                                          "--no-pictures"))
+        self.assertIn(b"doubtful     the pictures are of two eyes", done.stdout)
+        self.assertEqual(self.result()["two_eyes"], "side_by_side")
+        self.assertIn("ffmpeg -vf crop=iw/2", self.result()["notes"][0])
+
     def test_films_that_were_joined_as_bytes_are_named(self):
         half = COUNT // 2
         first = mov(PICTURES[:half], TIMES[:half])

@@ -10,6 +10,7 @@
 #include <cstring>
 #include <limits>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 #include <vector>
 
 #include "base/error.h"
@@ -25,6 +26,7 @@
 #include "odometry/reach.h"
 #include "odometry/repeated_pictures.h"
 #include "odometry/truth_doubts.h"
+#include "odometry/two_eyes.h"
 #include "pair/camera_advice.h"
 #include "pair/measures.h"
 #include "pair/options.h"
@@ -968,6 +970,36 @@ void test_a_frame_found_afterwards_is_where_the_camera_can_have_flown(void) {
   TEST_ASSERT_TRUE(reach.contains(7, 0, {0.3, 0, 0}));
 }
 
+// A camera that moves by a pixel a picture along a wall with a fine texture; other_by: how far
+// beside it the other eye is, pixels.
+EyesLayout eyes_of(EyesLayout layout, int other_by) {
+  cv::Mat wall(240, 1000, CV_8U);
+  cv::theRNG().state = 7;
+  cv::randu(wall, 0, 256);
+  cv::GaussianBlur(wall, wall, {9, 9}, 0);
+  cv::normalize(wall, wall, 0, 255, cv::NORM_MINMAX);
+  TwoEyes eyes;
+  for (int n = 0; n < 24; ++n) {
+    const cv::Mat one = wall(cv::Rect(n, 0, 320, 240));
+    const cv::Mat other = wall(cv::Rect(n + other_by, 0, 320, 240));
+    cv::Mat both;
+    if (layout == EyesLayout::kSideBySide) cv::hconcat(one, other, both);
+    if (layout == EyesLayout::kTopBottom) cv::vconcat(one, other, both);
+    if (layout == EyesLayout::kInTurn) both = n % 2 == 0 ? one : other;
+    eyes.add(layout == EyesLayout::kOne ? one : both);
+  }
+  TEST_ASSERT_EQUAL(eyes.layout() == EyesLayout::kOne, eyes.words().empty());
+  return eyes.layout();
+}
+
+void test_pictures_of_two_eyes_are_told_from_those_of_one() {
+  for (const EyesLayout layout :
+       {EyesLayout::kOne, EyesLayout::kSideBySide, EyesLayout::kTopBottom, EyesLayout::kInTurn})
+    TEST_ASSERT_EQUAL(layout, eyes_of(layout, 30));
+  // Halves of other places are no two eyes.
+  TEST_ASSERT_EQUAL(EyesLayout::kOne, eyes_of(EyesLayout::kSideBySide, 400));
+}
+
 void check_sortable(const char* name, DateReading reading, const char* sortable) {
   static char found[80];
   const std::vector<std::string> names = sortable_names({name}, reading);
@@ -1025,6 +1057,7 @@ void test_a_picture_that_stands_is_told_from_a_camera_that_does() {
 
 int main() {
   UNITY_BEGIN();
+  RUN_TEST(test_pictures_of_two_eyes_are_told_from_those_of_one);
   RUN_TEST(test_dates_and_times_of_names_are_written_so_that_they_sort);
   RUN_TEST(test_a_picture_that_stands_is_told_from_a_camera_that_does);
   RUN_TEST(test_a_clock_that_falls_and_rises_again_began_anew);

@@ -17,6 +17,7 @@
 #include "odometry/poses.h"
 #include "odometry/reach.h"
 #include "odometry/repeated_pictures.h"
+#include "odometry/two_eyes.h"
 #include "twoview/odometry.h"
 
 namespace cli {
@@ -127,6 +128,8 @@ class Flight {
   int num_repeated() const { return static_cast<int>(repeated_.stood().size()); }
   // A line on them; empty where there are none.
   std::string repeated_note() const;
+  // Whether the pictures are of two eyes, so that no camera describes them.
+  const TwoEyes& eyes() const { return eyes_; }
   const std::string& first_problem() const { return first_problem_; }
   // Whether the source ended before its frames could be tracked to the end, or --max-frames did.
   bool ended_tracked() const;
@@ -189,6 +192,7 @@ class Flight {
   std::map<int, std::vector<Rgb>> colours_;
   bool gap_ = false;  // a frame was left out before the next one
   RepeatedPictures repeated_;
+  TwoEyes eyes_;
   int num_unreadable_ = 0;
   std::string first_problem_;
 };

@@ -394,6 +394,8 @@ std::string summary(const FlightResult& result, const std::optional<FilmLens>& l
       text += summary_line("advice", "%s", kDoubtfulFocalAdvice);
     }
   }
+  if (j["two_eyes"].is_string())
+    text += summary_line("doubtful", "%s", "the pictures are of two eyes: do not fly by this path");
   if (on_camera.contradicts()) {
     text += summary_line("doubtful", "%s: do not fly by this path",
                          contradiction_words(on_camera).c_str());
@@ -622,6 +624,7 @@ int odometry(Arguments& a) {
     common.note(std::to_string(count) + (count == 1 ? " frame" : " frames") +
                 " could not be used, the first: " + flight.first_problem());
   if (const std::string note = flight.repeated_note(); !note.empty()) common.note(note);
+  if (const std::string note = flight.eyes().words(); !note.empty()) common.note(note);
   const std::optional<FilmFacts> film = source->film();
   FlightResult result = result_of(flight, truth, film ? film->clock_start_s : 0,
                                   wanted < 0 ? static_cast<int>(flight.frames().size()) : wanted);
