@@ -233,6 +233,33 @@ class OwnMatches(cli.CliTest):
                 self.refused(npz(mkpts0=points(rows, 0), mkpts1=points(rows, 1)), "look alike",
                              *words)
 
+    def test_pixels_of_pictures_that_were_cut_or_framed_are_refused_by_that(self):
+        zoom, middle = 1.15, (100, 20)  # a wall that comes nearer, which the camera does not face
+        small = cli.texture(WIDTH // 2, HEIGHT // 2)
+        wall = [bytes(small[y // 2][x // 2] for x in range(WIDTH)) for y in range(HEIGHT)]
+
+        def from_near(at, k):
+            return round(middle[k] + (at - middle[k]) / zoom)
+
+        near = [bytes(wall[from_near(y, 1)][from_near(x, 0)] for x in range(WIDTH))
+                for y in range(HEIGHT)]
+        for name, rows in (("a.png", wall), ("b.png", near)):
+            self.write(name, cli.png(WIDTH, HEIGHT, b"".join(rows)))
+        rng = random.Random(2)
+        places = [(rng.uniform(40, WIDTH - 60), rng.uniform(30, HEIGHT - 45)) for _ in range(150)]
+        given = [(x, y, middle[0] + zoom * (x - middle[0]), middle[1] + zoom * (y - middle[1]))
+                 for x, y in places]
+        for words, rows in (
+                (("cut or framed",),  # bars above and below, which move this wall as a shift does
+                 [(r[0], 0.75 * r[1] + HEIGHT / 8, r[2], 0.75 * r[3] + HEIGHT / 8)
+                  for r in given]),
+                (("cut or framed", "(24, 16) pixels"),  # by steps of 4 pixels
+                 [r for r in ((r[0] - 28, r[1] - 16, r[2] - 28, r[3] - 16) for r in given)
+                  if min(r) >= 0])):
+            with self.subTest(words=words):
+                self.refused(npz(mkpts0=points(rows, 0), mkpts1=points(rows, 1)), "look alike",
+                             *words)
+
     def test_pixels_at_which_the_pictures_are_not_alike_are_noted(self):
         for cut, noted in ((0, False), (30, True)):
             rows = [(r[0] - cut, *r[1:]) for r in self.rows]

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <opencv2/core.hpp>
 #include <vector>
 
@@ -23,15 +24,38 @@ constexpr double kFewAlike = 0.15;  // half of the least share
 // pixels between them, in one image 1000 pixels from its corner.
 constexpr double kScaleStep = 1.01, kScaleStepInOne = 1.002;
 constexpr double kMostScale = 4;
+// Cut and framed pictures are looked for where less of the matches are alike, first at some of
+// them. The pictures stay alike a few pixels beside the true places, since neighbours move alike.
+constexpr double kMostlyAlike = 0.5;
+constexpr size_t kCoarse = 60;
+constexpr int kShiftStep = 4;        // pixels
+constexpr double kMostShift = 0.25;  // of the picture's side
+constexpr double kMostFrame = 2;     // the side of a framed picture, over that of what is in it
 
 using Match = std::array<double, 4>;  // x, y in image 0 and in image 1
 
 // How the numbers of a match may be meant.
 struct Reading {
-  enum class Kind { kAsGiven, kSides, kRowColumn, kFromBelow, kLarger } kind = Kind::kAsGiven;
-  bool in[2] = {true, true};  // the images of which it is
-  double scale = 1;           // of kLarger
+  enum class Kind {
+    kAsGiven,
+    kSides,
+    kRowColumn,
+    kFromBelow,
+    kLarger,
+    kShifted,       // pictures that were cut or framed on one side
+    kFramedBeside,  // with bars of equal width left and right, which the numbers count
+    kFramedAbove    // above and below
+  } kind = Kind::kAsGiven;
+  bool in[2] = {true, true};        // the images of which it is
+  double scale = 1;                 // of kLarger and of frames
+  double shift_x = 0, shift_y = 0;  // of kShifted: what is added, pixels
 };
+
+// A place on a side of a picture that was squeezed into the middle of a frame of the same size.
+double unframed(double place, int side, double scale) {
+  const double middle = 0.5 * (side - 1);
+  return middle + scale * (place - middle);
+}
 
 Match read_as(const Reading& reading, Match match, const Picture pictures[2]) {
   if (reading.kind == Reading::Kind::kSides) return {match[2], match[3], match[0], match[1]};
@@ -40,6 +64,12 @@ Match read_as(const Reading& reading, Match match, const Picture pictures[2]) {
     if (!reading.in[v]) continue;
     if (reading.kind == Reading::Kind::kRowColumn) std::swap(*x, *y);
     if (reading.kind == Reading::Kind::kFromBelow) *y = pictures[v].luma.rows - 1 - *y;
+    if (reading.kind == Reading::Kind::kFramedBeside)
+      *x = unframed(*x, pictures[v].luma.cols, reading.scale);
+    if (reading.kind == Reading::Kind::kFramedAbove)
+      *y = unframed(*y, pictures[v].luma.rows, reading.scale);
+    *x += reading.shift_x;
+    *y += reading.shift_y;
     if (reading.kind != Reading::Kind::kLarger) continue;
     *x = (*x + 0.5) * reading.scale - 0.5;
     *y = (*y + 0.5) * reading.scale - 0.5;
@@ -112,6 +142,34 @@ std::vector<Reading> other_readings(const Picture pictures[2], const std::vector
   return readings;
 }
 
+// Of pictures that were cut or framed.
+std::vector<Reading> cut_readings(const Picture pictures[2]) {
+  std::vector<Reading> readings;
+  for (const Reading::Kind kind : {Reading::Kind::kFramedAbove, Reading::Kind::kFramedBeside})
+    for (double scale = kScaleStep; scale <= kMostFrame; scale *= kScaleStep)
+      readings.push_back({kind, {true, true}, scale});
+  const int most_x = static_cast<int>(kMostShift * pictures[0].luma.cols) / kShiftStep;
+  const int most_y = static_cast<int>(kMostShift * pictures[0].luma.rows) / kShiftStep;
+  for (int y = -most_y; y <= most_y; ++y)
+    for (int x = -most_x; x <= most_x; ++x) {
+      Reading reading{Reading::Kind::kShifted, {true, true}, 1};
+      reading.shift_x = kShiftStep * x;
+      reading.shift_y = kShiftStep * y;
+      if (x != 0 || y != 0) readings.push_back(reading);
+    }
+  return readings;
+}
+
+std::string shift_words(double shift_x, double shift_y, const Picture& picture) {
+  const double scale = static_cast<double>(picture.file_width) / picture.luma.cols;
+  char text[160];
+  std::snprintf(text, sizeof text,
+                "they are of pictures that were cut or framed: add about (%.0f, %.0f) pixels to x "
+                "and y",
+                scale * shift_x, scale * shift_y);
+  return text;
+}
+
 std::string words_of(const Reading& reading, const Picture pictures[2]) {
   const std::string where = reading.in[0] && reading.in[1] ? " in both images"
                             : reading.in[0]                ? " in image 0"
@@ -127,6 +185,16 @@ std::string words_of(const Reading& reading, const Picture pictures[2]) {
     case Reading::Kind::kLarger:
       return "they are of smaller pictures" + where + ", of about " + std::to_string(side) +
              " pixels on the longer side: --matches-resize L says it for both";
+    case Reading::Kind::kShifted: return shift_words(reading.shift_x, reading.shift_y, picture);
+    case Reading::Kind::kFramedAbove:
+    case Reading::Kind::kFramedBeside: {
+      const bool is_above = reading.kind == Reading::Kind::kFramedAbove;
+      const int whole = is_above ? picture.file_height : picture.file_width;
+      return std::string("they are of pictures with bars ") +
+             (is_above ? "above and below" : "left and right") + " of what is in these, about " +
+             std::to_string(std::lround(0.5 * whole * (1 - 1 / reading.scale))) + " of " +
+             std::to_string(whole) + " pixels each: take the bars off, and scale the rest";
+    }
     default:
       return "the sides are exchanged: exchange both, or name the pictures in the other order";
   }
@@ -145,6 +213,43 @@ bool is_clearly_better(const std::vector<bool>& given, const std::vector<bool>& 
 
 }  // namespace
 
+namespace {
+
+// The reading by which the pictures agree with most of these matches, and clearly with more than
+// they do as given; else that of the file.
+struct Best {
+  Reading reading;
+  size_t num_alike = 0;
+};
+Best best_of(const std::vector<Reading>& readings, const Picture pictures[2],
+             const std::vector<Match>& matches, const std::vector<bool>& given) {
+  Best best;
+  for (const Reading& reading : readings) {
+    const std::vector<bool> other = alike(reading, pictures, matches);
+    const size_t num = num_of(other);
+    if (num <= best.num_alike || !is_clearly_better(given, other)) continue;
+    best = {reading, num};
+  }
+  return best;
+}
+
+// Of cut and framed pictures, which are many: by some of the matches, and then by all.
+Best best_cut(const Picture pictures[2], const std::vector<Match>& matches,
+              const std::vector<bool>& given) {
+  std::vector<Match> some;
+  std::vector<bool> some_given;
+  const size_t step = 1 + matches.size() / kCoarse;
+  for (size_t i = 0; i < matches.size(); i += step) {
+    some.push_back(matches[i]);
+    some_given.push_back(given[i]);
+  }
+  const Best coarse = best_of(cut_readings(pictures), pictures, some, some_given);
+  if (coarse.num_alike == 0) return {};
+  return best_of({coarse.reading}, pictures, matches, given);
+}
+
+}  // namespace
+
 bool require_reading(const Picture pictures[2], bool may_be_smaller, const std::string& name,
                      const MatchList& matches) {
   std::vector<Match> some;
@@ -153,21 +258,17 @@ bool require_reading(const Picture pictures[2], bool may_be_smaller, const std::
                     matches.pixels[1][2 * i], matches.pixels[1][2 * i + 1]});
   if (some.size() < kGained) return true;
   const std::vector<bool> given = alike({}, pictures, some);
-  Reading best;
-  size_t most = 0;
-  for (const Reading& reading : other_readings(pictures, some, may_be_smaller)) {
-    const std::vector<bool> other = alike(reading, pictures, some);
-    const size_t num = num_of(other);
-    if (num <= most || !is_clearly_better(given, other)) continue;
-    most = num;
-    best = reading;
-  }
   const auto count = static_cast<double>(some.size());
-  if (static_cast<double>(most) < kAlikeShare * count)
-    return static_cast<double>(num_of(given)) >= kFewAlike * count;
+  const bool are_few = static_cast<double>(num_of(given)) < kFewAlike * count;
+  Best best = best_of(other_readings(pictures, some, may_be_smaller), pictures, some, given);
+  if (static_cast<double>(num_of(given)) < kMostlyAlike * count) {
+    const Best cut = best_cut(pictures, some, given);
+    if (cut.num_alike > best.num_alike) best = cut;
+  }
+  if (static_cast<double>(best.num_alike) < kAlikeShare * count) return !are_few;
   throw BadInput(name + ": the pictures look alike at " + std::to_string(num_of(given)) + " of " +
                  std::to_string(some.size()) + " matches as they stand, and at " +
-                 std::to_string(most) + " where " + words_of(best, pictures));
+                 std::to_string(best.num_alike) + " where " + words_of(best.reading, pictures));
 }
 
 }  // namespace cli
