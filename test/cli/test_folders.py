@@ -193,6 +193,9 @@ class Folders(CliTest):
         self.fill()
         self.assert_refused(self.run_program("odometry", "frames/frame1.png", "-o", self.out,
                                              "--focal-35mm", 26), "it is one picture", "folder")
+        animated = b"RIFF\x20\0\0\0WEBPVP8X\x0a\0\0\0\x02\0\0\0" + bytes(16)
+        self.assert_refused(self.run_program("odometry", self.write("a.webp", animated), "-o",
+                                             self.out), "is an animated picture", "folder")
 
     def test_what_is_no_frame_is_left_out_and_named(self):
         self.fill()

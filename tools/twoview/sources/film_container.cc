@@ -72,6 +72,8 @@ bool is_packed(AVStereo3DType type) {
   }
 }
 
+const std::string kPdf = "a PDF document";
+
 // What a file is by its first bytes where it is an archive or a document; else empty.
 std::string archive_kind(const std::string& path) {
   constexpr size_t kTarMark = 257;
@@ -88,7 +90,7 @@ std::string archive_kind(const std::string& path) {
              "7zXZ"))
     return "an xz archive";
   if (head.compare(kTarMark, 5, "ustar") == 0) return "a tar archive";
-  return begins("%PDF") ? "a PDF document" : "";
+  return begins("%PDF") ? kPdf : "";
 }
 
 Open open_film_file(const std::string& path) {
@@ -146,8 +148,10 @@ bool has_times(AVFormatContext& film, const AVStream& pictures) {
 
 FilmContainer read_film_container(const std::string& path) {
   if (const std::string kind = archive_kind(path); !kind.empty())
-    throw BadInput(path + " is " + kind +
-                   ", and no film: give the folder of its pictures, or the film in it");
+    throw BadInput(path + " is " + kind + ", and no film: " +
+                   (kind == kPdf ? "take its pictures out (pdfimages -all FILE frames/x), and give "
+                                   "their folder with --fps"
+                                 : "unpack it, and give the folder of its pictures, or the film"));
   const Open film = open_film_file(path);
   FilmContainer result;
   AVStream* pictures = nullptr;
