@@ -224,6 +224,14 @@ class Films(CliTest):
         self.assertEqual(result["film"]["num_damaged"], 1)
         self.assertIn(f"1 of the film's {COUNT - 8} packets are damaged", " ".join(result["notes"]))
 
+    def test_damaged_pictures_that_the_decoder_conceals_are_named(self):
+        bad = bytearray(PICTURES[7])
+        for at in range(len(bad) // 2, len(bad) // 2 + 40):
+            bad[at] ^= 0x5A
+        result = self.track(mov(PICTURES[:7] + [bytes(bad)] + PICTURES[8:], TIMES))
+        self.assertGreater(result["film"]["num_decoder_errors"], 0)
+        self.assertIn("the film's decoder reports ", " ".join(result["notes"]))
+
     def test_archives_and_documents_are_no_films(self):
         self.write("seq/a.png", PICTURES[0])
         tar = pathlib.Path(shutil.make_archive(self.folder / "a", "tar", self.folder, "seq"))
@@ -236,7 +244,7 @@ class Films(CliTest):
                 ("e.rar", b"Rar!\x1a\x07\x01" + bytes(600), "a RAR archive"),
                 ("f.pdf", b"%PDF-1.7\n" + PICTURES[0], "a PDF document")):
             self.assert_refused(self.odometry(self.write(name, data), "--fps", 10), name,
-                                f"is {kind}, and no film: give the folder")
+                                f"is {kind}, and no film: ")
 
     def test_what_is_no_film_with_pictures_is_named(self):
         sound = self.write("sound.mov", mov([PICTURES[0]], [0], sound_only=True))

@@ -239,7 +239,7 @@ nlohmann::ordered_json film_json(const std::optional<FilmFacts>& film) {
           {"size", {film->width, film->height}}, {"rotation_deg", film->turn_deg},
           {"mirrored", film->is_mirrored},       {"pixel_aspect", film->pixel_aspect},
           {"interlaced", film->is_interlaced},   {"joined", film->is_joined},
-          {"num_damaged", film->num_damaged}};
+          {"num_damaged", film->num_damaged},    {"num_decoder_errors", film->num_decoder_errors}};
 }
 
 // The camera that was estimated, as a file for the next flight. One that is doubtful is not

@@ -8,6 +8,7 @@
 #include <opencv2/videoio.hpp>
 
 #include "base/error.h"
+#include "sources/decoder_errors.h"
 #include "sources/film_container.h"
 #include "sources/joined_films.h"
 #include "sources/stream_clock.h"
@@ -121,6 +122,9 @@ void Film::State::end() {
   const double interval_s = mean_interval_s();
   if (facts.times == FilmFacts::Times::kContainer && container.duration_s > 0)
     facts.missing_s = std::max(0.0, container.duration_s - time_s - interval_s);
+  const DecoderErrors errors = decoder_errors();
+  facts.num_decoder_errors = errors.num;
+  facts.decoder_error = errors.first;
   const PacketCounts packets = count_packets(path);
   facts.num_packets = packets.num;
   facts.num_damaged = packets.num_damaged;
@@ -163,6 +167,7 @@ Film::Film(const std::string& path, double fps) : state_(std::make_unique<State>
     s.facts.times = FilmFacts::Times::kRate;
     s.step_s = 1 / s.container.rate_hz;
   }
+  listen_to_decoders();
 }
 
 Film::~Film() = default;
@@ -240,6 +245,11 @@ std::vector<std::string> Film::notes() const {
                     std::to_string(f.num_packets) +
                     " packets are damaged: pictures may show what was not there; record or copy "
                     "it again");
+  if (f.num_decoder_errors > 0)
+    notes.push_back("the film's decoder reports " + std::to_string(f.num_decoder_errors) +
+                    (f.num_decoder_errors == 1 ? " error" : " errors, the first") + " (" +
+                    f.decoder_error +
+                    "): pictures may show what was not there; record or copy it again");
   if (f.missing_s > std::max(kMissing_s, kMissingShare * s.container.duration_s))
     notes.push_back("the film's pictures end " + text_of("%.3g", f.missing_s) +
                     " s before its header says: it may be cut off");

@@ -30,7 +30,9 @@ struct FilmFacts {
   bool is_interlaced = false;  // by the container: the even and the odd rows may be of two moments
   bool is_joined = false;      // other films follow in the file, which are not read
   int64_t num_packets = 0, num_damaged = 0;  // once all pictures are read: of the container
-  double missing_s = 0;  // how much longer the film is by its header than by its pictures
+  int64_t num_decoder_errors = 0;  // once all pictures are read: what their decoder reported
+  std::string decoder_error;       // the first of these
+  double missing_s = 0;            // how much longer the film is by its header than by its pictures
 };
 constexpr const char* kJoinedNote =
     "the file holds several films one behind the other (joined as bytes), of which the first is "
