@@ -858,56 +858,45 @@ static void case_edge_costs(trial *t) {
 /* A row whose arrays are filled as the kernels before would: `stage` of them have run. */
 static tvk_dense_row dense_row(trial *t, int stage) {
   tvk_dense_row row;
-  const int32_t count = TVK_DENSE_BLOCK * pick(t, 1, 3, 2), pitch = count + 2 * TVK_DENSE_PAD;
-  uint8_t *before, *large, *across;
+  const int32_t count = TVK_DENSE_BLOCK * pick(t, 1, 3, 2), width = pick(t, 1, 60, 640);
+  uint8_t *large, *across, *above;
   int32_t x, k;
   memset(&row, 0, sizeof row);
-  row.width = pick(t, 1, 60, 640);
+  row.width = width;
   row.num_steps = count;
-  row.brighter0 = dense_bytes(t, row.width, 255);
-  row.darker0 = dense_bytes(t, row.width, 255);
-  row.brighter1 = dense_bytes(t, row.width + count, 255);
-  row.darker1 = dense_bytes(t, row.width + count, 255);
-  row.grey0 = dense_bytes(t, row.width, 255);
-  row.large = large = dense_bytes(t, row.width, 255);
-  row.across = across = dense_bytes(t, row.width, 255);
-  row.before = before = dense_bytes(t, row.width * pitch, 48);
-  row.costs =
-      stage < 1 ? OUTPUT(t, uint8_t, row.width * count) : dense_bytes(t, row.width * count, 16);
-  row.sums =
-      stage < 2 ? OUTPUT(t, uint8_t, row.width * count) : dense_bytes(t, row.width * count, 144);
-  row.after = OUTPUT(t, uint8_t, row.width * pitch);
-  row.least = OUTPUT(t, uint8_t, row.width);
-  row.ends = OUTPUT(t, uint8_t, 4 * pitch);
-  for (k = 0; stage == 1 && k < row.width * count; ++k) {
-    row.sums[k] = (uint8_t)random_int(&t->seed, 0, 48);
-  }
-  for (x = 0; x < row.width; ++x) {
+  row.brighter0 = dense_bytes(t, width, 255);
+  row.darker0 = dense_bytes(t, width, 255);
+  row.brighter1 = dense_bytes(t, width + count, 255);
+  row.darker1 = dense_bytes(t, width + count, 255);
+  row.grey0 = dense_bytes(t, width, 255);
+  row.large = large = dense_bytes(t, width, 255);
+  row.across = across = dense_bytes(t, width, 255);
+  above = dense_bytes(t, width * count, 48);
+  row.costs = stage < 1 ? OUTPUT(t, uint8_t, width * count) : dense_bytes(t, width * count, 16);
+  row.sums = OUTPUT(t, uint8_t, width * count);
+  row.above = OUTPUT(t, uint8_t, width * count);
+  row.least = OUTPUT(t, uint8_t, width);
+  row.scratch = OUTPUT(t, uint8_t, 3 * count);
+  memcpy(row.above, above, (size_t)(width * count));
+  for (k = 0; k < width * count; ++k) row.sums[k] = (uint8_t)random_int(&t->seed, 0, 96);
+  for (x = 0; x < width; ++x) {
     large[x] = (uint8_t)(TVK_DENSE_SMALL + large[x] % (TVK_DENSE_LARGE - TVK_DENSE_SMALL + 1));
     across[x] = (uint8_t)(TVK_DENSE_SMALL + across[x] % (TVK_DENSE_LARGE - TVK_DENSE_SMALL + 1));
-    memset(before + x * pitch, TVK_DENSE_NEVER, TVK_DENSE_PAD);
-    memset(before + x * pitch + TVK_DENSE_PAD + count, TVK_DENSE_NEVER, TVK_DENSE_PAD);
     row.least[x] = 255;
     for (k = 0; k < count; ++k) {
-      const uint8_t value = before[x * pitch + TVK_DENSE_PAD + k];
-      if (value < row.least[x]) row.least[x] = value;
+      if (above[x * count + k] < row.least[x]) row.least[x] = above[x * count + k];
     }
   }
   return row;
 }
 
-static void case_sum_down(trial *t) {
+static void case_sum_ahead(trial *t) {
   const tvk_dense_row row = dense_row(t, 0);
-  REPEAT(t, tvk_dense_of(t->set)->sum_down(&row));
-}
-
-static void case_sum_across(trial *t) {
-  const tvk_dense_row row = dense_row(t, 1);
-  REPEAT(t, tvk_dense_of(t->set)->sum_across(&row));
+  REPEAT(t, tvk_dense_of(t->set)->sum_ahead(&row));
 }
 
 static void case_choose_steps(trial *t) {
-  const tvk_dense_row row = dense_row(t, 2);
+  const tvk_dense_row row = dense_row(t, 1);
   int16_t *steps = OUTPUT(t, int16_t, row.width);
   uint8_t *least = OUTPUT(t, uint8_t, row.width), *margin = OUTPUT(t, uint8_t, row.width);
   uint8_t *least1 = OUTPUT(t, uint8_t, row.width + row.num_steps - 1);
@@ -937,11 +926,10 @@ static void case_support_row(trial *t) {
   REPEAT(t, tvk_dense_of(t->set)->support_row(rows, width, support, alike, slant));
 }
 
-static void case_cell_sums(trial *t) {
+static void case_cell_columns(trial *t) {
   const int32_t pitch = dense_pitch(pick(t, 1, 100, 640)), first = random_int(&t->seed, 0, 1);
   const int32_t num_columns = TVK_DENSE_SUMS * (pitch + TVK_DENSE_SPAN);
-  int32_t *columns = OUTPUT(t, int32_t, num_columns);
-  int32_t *sums = OUTPUT(t, int32_t, TVK_DENSE_SUMS * pitch), n, k;
+  int32_t *columns = OUTPUT(t, int32_t, num_columns), n, k;
   tvk_dense_rows rows;
   for (n = 0; n < 2 * TVK_DENSE_REACH + 2; ++n) {
     int16_t *g = INPUT(t, int16_t, pitch);
@@ -952,11 +940,20 @@ static void case_cell_sums(trial *t) {
     for (k = 0; k < pitch; ++k) g[k] = (int16_t)random_int(&t->seed, -510, 510);
   }
   for (k = 0; k < num_columns; ++k) columns[k] = random_int(&t->seed, 0, 1000000);
-  REPEAT(t, tvk_dense_of(t->set)->cell_sums(&rows, pitch, first, columns, sums));
+  REPEAT(t, tvk_dense_of(t->set)->cell_columns(&rows, pitch, first, columns));
 }
 
-static void case_fit_row(trial *t) {
-  const int32_t pitch = dense_pitch(pick(t, 1, 60, 640));
+static void case_cell_sums(trial *t) {
+  const int32_t pitch = TVK_DENSE_STRETCH * pick(t, 1, 3, 10);
+  const int32_t num_columns = TVK_DENSE_SUMS * (pitch + TVK_DENSE_SPAN);
+  int32_t *columns = INPUT(t, int32_t, num_columns), k;
+  int32_t *sums = OUTPUT(t, int32_t, TVK_DENSE_SUMS * TVK_DENSE_STRETCH);
+  for (k = 0; k < num_columns; ++k) columns[k] = random_int(&t->seed, 0, 1000000);
+  REPEAT(t, tvk_dense_of(t->set)->cell_sums(columns + pitch - TVK_DENSE_STRETCH, pitch, sums));
+}
+
+static void case_fit_cells(trial *t) {
+  enum { pitch = TVK_DENSE_STRETCH };
   int32_t *sums = INPUT(t, int32_t, TVK_DENSE_SUMS * pitch), x, k;
   int16_t *steps = INPUT(t, int16_t, pitch);
   uint8_t *alike = INPUT(t, uint8_t, pitch), *similarity = OUTPUT(t, uint8_t, pitch);
@@ -979,8 +976,8 @@ static void case_fit_row(trial *t) {
     alike[x] = (uint8_t)random_int(&t->seed, 0, 49);
     slant[x] = (int8_t)random_int(&t->seed, -alike[x], alike[x]);
   }
-  REPEAT(t, tvk_dense_of(t->set)->fit_row(sums, steps, alike, slant, pitch, &model, parallax, sigma,
-                                          similarity));
+  REPEAT(t, tvk_dense_of(t->set)->fit_cells(sums, steps, alike, slant, &model, parallax, sigma,
+                                            similarity));
   for (x = 0; x < pitch; ++x) {
     TEST_ASSERT_TRUE(parallax[x] >= steps[x] - 2.001f && parallax[x] <= steps[x] + 2.001f);
     TEST_ASSERT_TRUE(sigma[x] > 0 && sigma[x] < 1 && similarity[x] > 0);
@@ -996,32 +993,39 @@ static void case_smooth_row(trial *t) {
   REPEAT(t, tvk_dense_of(t->set)->smooth_row(rows, width, out));
 }
 
-static void case_place_span(trial *t) {
+static void case_place_row(trial *t) {
   const int32_t width = pick(t, 1, 300, 640), height = pick(t, 1, 300, 480);
-  tvk_dense_span *span = INPUT(t, tvk_dense_span, 1);
-  int32_t *u = OUTPUT(t, int32_t, TVK_DENSE_NODES), *v = OUTPUT(t, int32_t, TVK_DENSE_NODES);
-  int k;
-  memset(span, 0, sizeof *span);
-  for (k = 0; k < 4; ++k) {
-    const double size = k == 0 ? 300 : k == 1 ? 1 : k == 2 ? 0.01 : 1e-4;
-    span->u[k] = size * (2 * random_unit(&t->seed) - 0.5);
-    span->v[k] = size * (2 * random_unit(&t->seed) - 0.5);
+  const int32_t num = pick(t, 1, 9, 80);
+  tvk_dense_span *spans = INPUT(t, tvk_dense_span, num);
+  int32_t *u = OUTPUT(t, int32_t, num * TVK_DENSE_NODES);
+  int32_t *v = OUTPUT(t, int32_t, num * TVK_DENSE_NODES), n, k;
+  memset(spans, 0, (size_t)num * sizeof *spans);
+  for (n = 0; n < num; ++n) {
+    for (k = 0; k < 4; ++k) {
+      const double size = k == 0 ? 300 : k == 1 ? 1 : k == 2 ? 0.01 : 1e-4;
+      spans[n].at[k][0] = size * (2 * random_unit(&t->seed) - 0.5);
+      spans[n].at[k][1] = size * (2 * random_unit(&t->seed) - 0.5);
+    }
+    spans[n].is_smooth = random_int(&t->seed, 0, 5) > 0;
   }
-  REPEAT(t, tvk_dense_of(t->set)->place_span(span, random_int(&t->seed, 0, 1) ? 1 : 0.5, width,
-                                             height, u, v));
+  REPEAT(t, tvk_dense_of(t->set)->place_row(spans, num, random_int(&t->seed, 0, 1) ? 1 : 0.5, width,
+                                            height, u, v));
 }
 
-static void case_sample_span(trial *t) {
+static void case_sample_row(trial *t) {
   const int32_t width = pick(t, 1, 40, 640), height = pick(t, 1, 40, 480);
-  const int32_t count = pick(t, 1, TVK_DENSE_NODES, TVK_DENSE_NODES);
-  uint8_t *image = INPUT(t, uint8_t, width * height), *out = OUTPUT(t, uint8_t, count);
+  const int32_t stride = width + pick(t, 0, 3, 0), count = pick(t, 1, 60, 640);
+  const int32_t sparsity = random_int(&t->seed, 0, 1) ? 9 : 90;
+  uint8_t *image = INPUT(t, uint8_t, stride * (height - 1) + width),
+          *out = OUTPUT(t, uint8_t, count);
   int32_t *u = INPUT(t, int32_t, count), *v = INPUT(t, int32_t, count), k;
-  for (k = 0; k < width * height; ++k) image[k] = (uint8_t)random_int(&t->seed, 0, 255);
+  for (k = 0; k < stride * (height - 1) + width; ++k)
+    image[k] = (uint8_t)random_int(&t->seed, 0, 255);
   for (k = 0; k < count; ++k) {
-    u[k] = random_int(&t->seed, 0, 9) == 0 ? -1 : random_int(&t->seed, 0, (width - 1) << 16);
+    u[k] = random_int(&t->seed, 0, sparsity) == 0 ? -1 : random_int(&t->seed, 0, (width - 1) << 16);
     v[k] = random_int(&t->seed, 0, (height - 1) << 16);
   }
-  REPEAT(t, tvk_dense_of(t->set)->sample_span(image, width, height, width, u, v, count, out));
+  REPEAT(t, tvk_dense_of(t->set)->sample_row(image, width, height, stride, u, v, count, out));
 }
 
 static void case_census_words(trial *t) {
@@ -1071,7 +1075,6 @@ static void case_plane_costs(trial *t) {
 
 static void case_sum_planes(trial *t) {
   const int32_t width = pick(t, 1, 60, 320), count = TVK_DENSE_BLOCK * pick(t, 1, 3, 3);
-  const int32_t pitch = count + 2 * TVK_DENSE_PAD;
   uint8_t *const kept_before = dense_bytes(t, width * count, 252);
   uint8_t *kept = OUTPUT(t, uint8_t, width * count);
   uint8_t *across = dense_bytes(t, width + 1, 255);
@@ -1088,25 +1091,23 @@ static void case_sum_planes(trial *t) {
     across[x] = (uint8_t)(TVK_DENSE_SMALL + across[x] % (TVK_DENSE_LARGE - TVK_DENSE_SMALL + 1));
   }
   for (p = 0; p < 3; ++p) {
-    uint8_t *before = dense_bytes(t, width * pitch, TVK_SWEEP_BITS + TVK_DENSE_LARGE);
+    uint8_t *before = dense_bytes(t, width * count, TVK_SWEEP_BITS + TVK_DENSE_LARGE);
     uint8_t *least = INPUT(t, uint8_t, width), *large = dense_bytes(t, width, 255);
     for (x = 0; x < width; ++x) {
-      uint8_t *const line = before + x * pitch;
+      const uint8_t *const line = before + x * count;
       large[x] = (uint8_t)(TVK_DENSE_SMALL + large[x] % (TVK_DENSE_LARGE - TVK_DENSE_SMALL + 1));
-      memset(line, TVK_DENSE_NEVER, TVK_DENSE_PAD);
-      memset(line + TVK_DENSE_PAD + count, TVK_DENSE_NEVER, TVK_DENSE_PAD);
       least[x] = 255;
       for (k = 0; k < count; ++k) {
-        if (line[TVK_DENSE_PAD + k] < least[x]) least[x] = line[TVK_DENSE_PAD + k];
+        if (line[k] < least[x]) least[x] = line[k];
       }
     }
     row.before[p] = before;
     row.least_before[p] = least;
     row.large[p] = large;
-    row.after[p] = OUTPUT(t, uint8_t, width * pitch);
+    row.after[p] = OUTPUT(t, uint8_t, width * count);
     row.least_after[p] = OUTPUT(t, uint8_t, width);
   }
-  row.scratch = OUTPUT(t, uint8_t, 3 * pitch);
+  row.scratch = OUTPUT(t, uint8_t, 2 * count);
   memcpy(kept, kept_before, (size_t)(width * count));
   REPEAT(t, tvk_dense_of(t->set)->sum_planes(&row));
 }

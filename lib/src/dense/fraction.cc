@@ -1,11 +1,13 @@
 #include "dense/fraction.h"
 
+#include <algorithm>
 #include <cstring>
 
 namespace tv {
 namespace {
 
 constexpr int32_t kReach = TVK_DENSE_REACH, kRows = 2 * kReach + 2;
+constexpr int32_t kStretch = TVK_DENSE_STRETCH;
 // Of a window of 5 x 5 cells, those that have the step of the middle to within one.
 constexpr int32_t kLeastSupport = 14;
 // Windows that are less alike than this show different things: a correlation of 0.7.
@@ -27,10 +29,9 @@ struct Ring {
   size_t at(int32_t y) const { return static_cast<size_t>((y + 2 * kRows) % kRows) * pitch; }
 };
 
-// A row and its frame, in whole blocks.
+// A row and its frame, in whole stretches.
 size_t pitch_of(int32_t width) {
-  return (static_cast<size_t>(width) + 2 * kReach + TVK_DENSE_SPAN - 1) / TVK_DENSE_SPAN *
-         TVK_DENSE_SPAN;
+  return (static_cast<size_t>(width) + 2 * kReach + kStretch - 1) / kStretch * kStretch;
 }
 
 // Writes row y of the ring: image 0, image 1 moved by the steps, and their slopes.
@@ -59,17 +60,35 @@ void fill_row(const RowPair& rows, const Steps& steps, int32_t y, const Ring& ri
   }
 }
 
+// Refines the cells of a stretch that begins at column x. around: the rows of steps of their
+// windows, from the frame on.
+void refine_stretch(const int16_t* const* around, const uint8_t* is_cell, const int32_t* sums,
+                    int32_t x, int32_t count, const tvk_dense_table& kernels,
+                    const DenseCells& out) {
+  const int16_t* rows[2 * kReach + 1];
+  for (int v = 0; v <= 2 * kReach; ++v) rows[v] = around[v] + x;
+  uint8_t support[kStretch], alike[kStretch] = {};
+  int8_t slant[kStretch] = {};
+  kernels.support_row(rows, count, support, alike, slant);
+  const int16_t* const found = rows[kReach] + kReach;
+  kernels.fit_cells(sums, found, alike, slant, &kModel, out.parallax, out.sigma, out.similarity);
+  for (int32_t i = 0; i < count; ++i) {
+    const bool good = (is_cell[x + i] != 0) & (support[i] >= kLeastSupport) &
+                      (out.similarity[i] >= kLeastSimilarity);
+    out.parallax[i] = good ? out.parallax[i] : -1.0f;
+  }
+}
+
 }  // namespace
 
 size_t refine_rows_bytes(int32_t width) {
   const size_t pitch = pitch_of(width);
   return 3 * arena_bytes<uint8_t>(kRows * pitch) + arena_bytes<int16_t>(kRows * pitch) +
          arena_bytes<int32_t>(TVK_DENSE_SUMS * (pitch + TVK_DENSE_SPAN)) +
-         arena_bytes<int32_t>(TVK_DENSE_SUMS * pitch) + 2 * arena_bytes<uint8_t>(pitch) +
-         arena_bytes<int8_t>(pitch);
+         arena_bytes<int32_t>(TVK_DENSE_SUMS * kStretch);
 }
 
-size_t cells_entries(size_t cells) { return cells + 2 * (TVK_DENSE_SPAN + kReach); }
+size_t cells_entries(size_t cells) { return cells + kStretch; }
 
 void refine_rows(const RowPair& rows, const Steps& steps, const tvk_dense_table& kernels,
                  Arena& arena, const DenseCells& cells) {
@@ -83,13 +102,7 @@ void refine_rows(const RowPair& rows, const Steps& steps, const tvk_dense_table&
   ring.is_cell = arena_alloc<uint8_t>(arena, kRows * pitch);
   ring.g = arena_alloc<int16_t>(arena, kRows * pitch);
   int32_t* const columns = arena_alloc<int32_t>(arena, TVK_DENSE_SUMS * (pitch + TVK_DENSE_SPAN));
-  int32_t* const sums = arena_alloc<int32_t>(arena, TVK_DENSE_SUMS * pitch);
-  uint8_t* const support = arena_alloc<uint8_t>(arena, pitch);
-  uint8_t* const alike = arena_alloc<uint8_t>(arena, pitch);
-  int8_t* const slant = arena_alloc<int8_t>(arena, pitch);
-  // The entries behind a row's width, which kernels read too.
-  std::memset(alike, 0, pitch);
-  std::memset(slant, 0, pitch);
+  int32_t* const sums = arena_alloc<int32_t>(arena, TVK_DENSE_SUMS * kStretch);
   for (int32_t y = -kReach; y < kReach; ++y) fill_row(rows, steps, y, ring);
   for (int32_t y = 0; y < rows.height; ++y) {
     fill_row(rows, steps, y + kReach, ring);
@@ -104,20 +117,17 @@ void refine_rows(const RowPair& rows, const Steps& steps, const tvk_dense_table&
       window.is_cell[v] = ring.is_cell + at;
       if (v < kRows - 1) around[v] = steps.row(y - kReach + v) - kReach;
     }
-    float* const parallax = cells.parallax + static_cast<ptrdiff_t>(y) * width;
-    float* const sigma = cells.sigma + static_cast<ptrdiff_t>(y) * width;
-    uint8_t* const similarity = cells.similarity + static_cast<ptrdiff_t>(y) * width;
-    kernels.support_row(around, width, support, alike, slant);
-    kernels.cell_sums(&window, static_cast<int32_t>(pitch), y == 0, columns, sums);
-    kernels.fit_row(sums, steps.row(y), alike, slant, static_cast<int32_t>(pitch), &kModel,
-                    parallax, sigma, similarity);
-    const int16_t* const found = steps.row(y);
+    kernels.cell_columns(&window, static_cast<int32_t>(pitch), y == 0, columns);
     const uint8_t* const is_cell = ring.is_cell + ring.at(y) + kReach;
-    for (int32_t x = 0; x < width; ++x) {
-      if (found[x] < 0 || is_cell[x] == 0 || support[x] < kLeastSupport ||
-          similarity[x] < kLeastSimilarity) {
-        parallax[x] = -1;
+    for (int32_t x = 0; x < width; x += kStretch) {
+      const DenseCells out = cells.from(static_cast<ptrdiff_t>(y) * width + x);
+      const int32_t count = std::min(kStretch, width - x);
+      if (std::memchr(is_cell + x, 1, static_cast<size_t>(count)) == nullptr) {
+        std::fill(out.parallax, out.parallax + count, -1.0f);
+        continue;
       }
+      kernels.cell_sums(columns + x, static_cast<int32_t>(pitch), sums);
+      refine_stretch(around, is_cell, sums, x, count, kernels, out);
     }
   }
 }

@@ -11,9 +11,13 @@ namespace tv {
 
 // The cells of a pair, row by row, width x height, in arrays of cells_entries.
 struct DenseCells {
-  float* parallax;      // in steps; below 0 where there is none
+  float* parallax;      // in steps; below 0 where there is none, and nothing else is known
   float* sigma;         // its standard deviation, in steps
   uint8_t* similarity;  // the correlation of the windows, 1 .. 255
+
+  DenseCells from(ptrdiff_t cell) const {
+    return {parallax + cell, sigma + cell, similarity + cell};
+  }
 };
 
 // Room for so many cells, and for what kernels write behind a row.

@@ -22,8 +22,6 @@ constexpr double kSigmaFloor = 0.15, kSigmaMargin = 10, kMarginOffset = 1.2;
 constexpr size_t kFrame = TVK_DENSE_BLOCK;
 size_t row_bytes(int32_t width) { return static_cast<size_t>(width) + 2 * kFrame; }
 
-size_t line_bytes(int32_t count) { return static_cast<size_t>(count) + 2 * TVK_DENSE_PAD; }
-
 // Where the planes put a pixel in a view: element scale * pixel + (x, y), rounded down.
 struct PlanePlaces {
   float *scale, *x, *y;
@@ -36,12 +34,11 @@ struct PathLines {
 };
 
 PathLines make_lines(int32_t width, int32_t count, Arena& arena) {
-  const size_t line = line_bytes(count), size = static_cast<size_t>(width) * line;
+  const size_t columns = static_cast<size_t>(width);
   PathLines lines;
   for (int p = 0; p < 3; ++p) {
-    lines.costs[p] = arena_alloc<uint8_t>(arena, size);
-    lines.least[p] = arena_alloc<uint8_t>(arena, static_cast<size_t>(width));
-    std::memset(lines.costs[p], TVK_DENSE_NEVER, size);
+    lines.costs[p] = arena_alloc<uint8_t>(arena, columns * static_cast<size_t>(count));
+    lines.least[p] = arena_alloc<uint8_t>(arena, columns);
   }
   return lines;
 }
@@ -98,7 +95,7 @@ Sweep::Sweep(const PlaneSweep& sweep, const tvk_dense_table& kernels, Arena& are
   across_ = row_of();
   for (uint8_t*& large : large_) large = row_of();
   margin_ = row_of();
-  scratch_ = arena_alloc<uint8_t>(arena, 3 * line_bytes(count_));
+  scratch_ = arena_alloc<uint8_t>(arena, 2 * planes);
   best_ = arena_alloc<int16_t>(arena, width);
   row_ = arena_alloc<SweptPixel>(arena, width);
   place_planes();
@@ -175,13 +172,11 @@ SweptPixel Sweep::pixel_of(int32_t x, const uint8_t* sums, int32_t best, int32_t
 // the way forward are added to on the way back, and each row is handed over.
 void Sweep::go(bool forward, const SweptRows* rows) {
   const int32_t step = forward ? 1 : -1, first = forward ? 0 : height_ - 1;
-  const size_t line = line_bytes(count_), planes = static_cast<size_t>(count_);
+  const size_t planes = static_cast<size_t>(count_);
   const size_t row_size = static_cast<size_t>(width_) * planes;
   for (int p = 0; p < 3; ++p) {
     std::memset(before_.least[p], 0, static_cast<size_t>(width_));
-    for (int32_t x = 0; x < width_; ++x) {
-      std::memset(before_.costs[p] + static_cast<size_t>(x) * line + TVK_DENSE_PAD, 0, planes);
-    }
+    std::memset(before_.costs[p], 0, row_size);
   }
   read_row(first, grey_before_);
   for (int32_t j = 0, y = first; j < height_; ++j, y += step) {
@@ -229,10 +224,10 @@ void Sweep::go(bool forward, const SweptRows* rows) {
 size_t sweep_planes_bytes(const MapGrid& grid, int32_t max_planes, int32_t num_views) {
   const size_t width = static_cast<size_t>(grid.width), planes = static_cast<size_t>(max_planes);
   const size_t volume = width * static_cast<size_t>(grid.height) * planes;
-  const size_t views = static_cast<size_t>(num_views), line = line_bytes(max_planes);
+  const size_t views = static_cast<size_t>(num_views);
   return 2 * arena_bytes<uint8_t>(volume) + 4 * views * arena_bytes<float>(planes) +
-         6 * (arena_bytes<uint8_t>(width * line) + arena_bytes<uint8_t>(width)) +
-         7 * arena_bytes<uint8_t>(row_bytes(grid.width)) + arena_bytes<uint8_t>(3 * line) +
+         6 * (arena_bytes<uint8_t>(width * planes) + arena_bytes<uint8_t>(width)) +
+         7 * arena_bytes<uint8_t>(row_bytes(grid.width)) + arena_bytes<uint8_t>(2 * planes) +
          arena_bytes<int16_t>(width) + arena_bytes<SweptPixel>(width);
 }
 

@@ -314,17 +314,26 @@ int32_t spans_of(int32_t columns) { return (columns + kSpan - 1) / kSpan; }
 
 size_t track_bytes(int32_t columns) {
   const size_t spans = static_cast<size_t>(spans_of(columns));
-  return arena_bytes<double>(2 * (spans + 3)) + arena_bytes<tvk_dense_span>(spans);
+  return arena_bytes<double>(2 * (spans + 3)) + arena_bytes<tvk_dense_span>(spans) +
+         2 * arena_bytes<int32_t>(spans * kSpan);
 }
 
 Track::Track(const DenseGrid& grid, const DenseView& view, double first, int32_t columns,
              Arena& arena)
-    : grid_(grid), view_(view), first_(first), columns_(columns), num_spans_(spans_of(columns)) {
+    : grid_(grid),
+      view_(view),
+      first_(first),
+      last_u_(view.camera.model.width - 1),
+      last_v_(view.camera.model.height - 1),
+      columns_(columns),
+      num_spans_(spans_of(columns)) {
   along_ = rotate(view.rotation, grid.baseline);
   side_ = rotate(view.rotation, grid.side);
   up_ = rotate(view.rotation, grid.up);
   nodes_ = arena_alloc<double>(arena, 2 * (static_cast<size_t>(num_spans_) + 3));
   spans_ = arena_alloc<tvk_dense_span>(arena, static_cast<size_t>(num_spans_));
+  u_ = arena_alloc<int32_t>(arena, static_cast<size_t>(num_spans_ * kSpan));
+  v_ = arena_alloc<int32_t>(arena, static_cast<size_t>(num_spans_ * kSpan));
   if (grid.is_flat) return;
   for (int32_t n = 0; n < num_spans_ + 3; ++n) {
     const double angle = grid.column(first + (n - 1) * kSpan);
@@ -343,6 +352,18 @@ bool Track::exact_at(double column, Vec2* pixel) const {
   double sine, cosine;
   sincos(angle, &sine, &cosine);
   return project(view_.camera, combine(cosine, along_, sine, across_), pixel, nullptr);
+}
+
+Place Track::exact_place_at(double column) const {
+  Vec2 exact;
+  if (!exact_at(column, &exact)) return {0, 0, false};
+  return moved_inside(exact[0], exact[1]);
+}
+
+Place Track::moved_inside(double u, double v) const {
+  const Place place{std::min(std::max(u, 0.0), last_u_), std::min(std::max(v, 0.0), last_v_), true};
+  const bool is_near = std::fabs(u - place.u) <= 0.5 && std::fabs(v - place.v) <= 0.5;
+  return {place.u, place.v, is_near};
 }
 
 void Track::go_to_row(int32_t y) {
@@ -375,11 +396,10 @@ void Track::go_to_row(int32_t y) {
     if (!span.is_smooth) continue;
     for (int i = 0; i < 2; ++i) {
       const double a = at[0][i], b = at[1][i], c = at[2][i], d = at[3][i];
-      double* p = i == 0 ? span.u : span.v;
-      p[0] = b;
-      p[1] = (c - a / 3 - b / 2 - d / 6) / kSpan;
-      p[2] = ((a + c) / 2 - b) / (kSpan * kSpan);
-      p[3] = ((d - a) / 6 + (b - c) / 2) / (kSpan * kSpan * kSpan);
+      span.at[0][i] = b;
+      span.at[1][i] = (c - a / 3 - b / 2 - d / 6) / kSpan;
+      span.at[2][i] = ((a + c) / 2 - b) / (kSpan * kSpan);
+      span.at[3][i] = ((d - a) / 6 + (b - c) / 2) / (kSpan * kSpan * kSpan);
     }
   }
 }
@@ -387,26 +407,20 @@ void Track::go_to_row(int32_t y) {
 void Track::sample(const tvk_dense_table& kernels, uint8_t* pixels) const {
   const tv_image& image = view_.image;
   const double scale = 1.0 / (1 << view_.halvings);
+  kernels.place_row(spans_, num_spans_, scale, image.width, image.height, u_, v_);
   for (int32_t n = 0; n < num_spans_; ++n) {
-    const int32_t x = n * kSpan;
-    int32_t u[kSpan], v[kSpan];
-    if (spans_[n].is_smooth) {
-      kernels.place_span(&spans_[n], scale, image.width, image.height, u, v);
-    } else {
-      for (int32_t i = 0; i < kSpan; ++i) {
-        Vec2 at;
-        u[i] = -1;
-        if (!exact_at(x + i, &at)) continue;
-        const double column = (at[0] + 0.5) * scale - 0.5, row = (at[1] + 0.5) * scale - 0.5;
-        if (!(column >= 0 && row >= 0 && column <= image.width - 1 && row <= image.height - 1))
-          continue;
-        u[i] = static_cast<int32_t>(column * 65536);
-        v[i] = static_cast<int32_t>(row * 65536);
-      }
+    for (int32_t x = n * kSpan; x < (n + 1) * kSpan && !spans_[n].is_smooth; ++x) {
+      Vec2 at;
+      if (!exact_at(x, &at)) continue;
+      const double column = (at[0] + 0.5) * scale - 0.5, row = (at[1] + 0.5) * scale - 0.5;
+      if (!(column >= 0 && row >= 0 && column <= image.width - 1 && row <= image.height - 1))
+        continue;
+      u_[x] = static_cast<int32_t>(column * 65536);
+      v_[x] = static_cast<int32_t>(row * 65536);
     }
-    kernels.sample_span(image.data, image.width, image.height, image.stride_bytes, u, v,
-                        std::min(kSpan, columns_ - x), pixels + x);
   }
+  kernels.sample_row(image.data, image.width, image.height, image.stride_bytes, u_, v_, columns_,
+                     pixels);
 }
 
 }  // namespace tv

@@ -71,6 +71,12 @@ bool make_grid(const Camera& camera0, const Mat3& R, const Vec3& t, const Parall
 // Halves the view's image as often as the grid's cells are wide. The halved image is in the arena.
 void halve(const DenseGrid& grid, double pixel_angle, Arena& arena, DenseView* view);
 
+// Where an image shows a cell, if it does.
+struct Place {
+  double u, v;
+  bool is_seen;
+};
+
 // Where a row of the grid lies in an image: pixels as polynomials over spans of columns.
 class Track {
  public:
@@ -79,40 +85,37 @@ class Track {
   void go_to_row(int32_t y);
   // Resamples the image along the row: 0 where the image has no pixel; other values are at least 1.
   void sample(const tvk_dense_table& kernels, uint8_t* pixels) const;
-  // The pixel of the unhalved image at a column of [0, columns), which need not be whole. Returns
-  // false where the view does not see it. In the header, since it is done for every point.
-  bool pixel_at(double column, double* u, double* v) const {
-    const int32_t n = static_cast<int32_t>(column) / TVK_DENSE_NODES;
+  // The pixel of the unhalved image at a column of [0, columns), which need not be whole. In the
+  // header, since it is done for every point.
+  Place place_at(double column) const {
+    const int32_t n = static_cast<int32_t>(static_cast<uint32_t>(column) / TVK_DENSE_NODES);
     const tvk_dense_span& span = spans_[n];
-    if (span.is_smooth) {
-      const double s = column - n * TVK_DENSE_NODES;
-      *u = ((span.u[3] * s + span.u[2]) * s + span.u[1]) * s + span.u[0];
-      *v = ((span.v[3] * s + span.v[2]) * s + span.v[1]) * s + span.v[0];
-    } else {
-      Vec2 exact;
-      if (!exact_at(column, &exact)) return false;
-      *u = exact[0], *v = exact[1];
-    }
-    // What lies on the image's edge, or a fraction of a step beyond it, lies on the edge.
-    const double last_u = view_.camera.model.width - 1, last_v = view_.camera.model.height - 1;
-    const double inside_u = std::min(std::max(*u, 0.0), last_u);
-    const double inside_v = std::min(std::max(*v, 0.0), last_v);
-    const bool is_near = std::fabs(*u - inside_u) <= 0.5 && std::fabs(*v - inside_v) <= 0.5;
-    *u = inside_u, *v = inside_v;
-    return is_near;
+    if (!span.is_smooth) return exact_place_at(column);
+    const double s = column - n * TVK_DENSE_NODES;
+    const auto cubic = [&](int i) {
+      return ((span.at[3][i] * s + span.at[2][i]) * s + span.at[1][i]) * s + span.at[0][i];
+    };
+    const Place place{cubic(0), cubic(1), true};
+    const bool is_inside =
+        (place.u >= 0) & (place.v >= 0) & (place.u <= last_u_) & (place.v <= last_v_);
+    return is_inside ? place : moved_inside(place.u, place.v);
   }
 
  private:
   bool exact_at(double column, Vec2* pixel) const;
+  Place exact_place_at(double column) const;
+  // What lies a fraction of a step beyond the image's edge is moved to it.
+  Place moved_inside(double u, double v) const;
 
   const DenseGrid& grid_;
   const DenseView& view_;
   Vec3 along_, side_, up_;  // the grid's axes in the view's frame
   Vec3 across_;             // of the row: angles only
-  double first_;
+  double first_, last_u_, last_v_;
   int32_t columns_, num_spans_;
   double* nodes_;  // sine and cosine of the nodes' angles, for a grid of angles
   tvk_dense_span* spans_;
+  int32_t *u_, *v_;  // scratch of `sample`
 };
 
 }  // namespace tv

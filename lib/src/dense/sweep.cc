@@ -83,9 +83,8 @@ size_t steps_entries(int32_t max_cells, int32_t longest_side) {
 
 size_t match_rows_bytes(int32_t width, int32_t num_steps, size_t cells) {
   const size_t n = static_cast<size_t>(width), steps = static_cast<size_t>(num_steps);
-  const size_t pitch = steps + 2 * TVK_DENSE_PAD;
-  return 2 * arena_bytes<uint8_t>(n * steps) + 2 * arena_bytes<uint8_t>(n * pitch) +
-         arena_bytes<uint8_t>(4 * pitch) + 7 * arena_bytes<uint8_t>(row_bytes(width)) +
+  return 3 * arena_bytes<uint8_t>(n * steps) + arena_bytes<uint8_t>(3 * steps) +
+         7 * arena_bytes<uint8_t>(row_bytes(width)) +
          3 * arena_bytes<uint8_t>(row_bytes(width + num_steps)) + pixels_bytes(cells) +
          pixels_bytes(cells + n * steps);
 }
@@ -101,21 +100,17 @@ void match_rows(const RowPair& rows, const tvk_dense_table& kernels, Arena& aren
   const ArenaScope scope(arena);
   const int32_t width = rows.width, count = rows.num_steps, width1 = rows.columns1();
   const size_t n = static_cast<size_t>(width), line = static_cast<size_t>(count);
-  const size_t pitch = line + 2 * TVK_DENSE_PAD;
   const auto bytes = [&](size_t size) { return arena_alloc<uint8_t>(arena, size); };
   const auto row_of = [&](int32_t columns) { return bytes(row_bytes(columns)); };
-  uint8_t* before = bytes(n * pitch);
-  uint8_t* after = bytes(n * pitch);
   uint8_t *const costs = bytes(n * line), *const sums = bytes(n * line);
-  uint8_t *const ends = bytes(4 * pitch), *const least = row_of(width);
+  uint8_t *const above_costs = bytes(n * line), *const scratch = bytes(3 * line);
+  uint8_t* const least = row_of(width);
   uint8_t *const large = row_of(width), *const across = row_of(width);
   uint8_t *const brighter0 = row_of(width), *const darker0 = row_of(width);
   uint8_t *const chosen = row_of(width), *const margin = row_of(width);
   uint8_t *const brighter1 = row_of(width1), *const darker1 = row_of(width1);
   uint8_t* const least1 = row_of(width1);
-  std::memset(before, TVK_DENSE_NEVER, n * pitch);
-  std::memset(after, TVK_DENSE_NEVER, n * pitch);
-  for (size_t x = 0; x < n; ++x) std::memset(before + x * pitch + TVK_DENSE_PAD, 0, line);
+  std::memset(above_costs, 0, n * line);
   std::memset(least, 0, n);
 
   Source source0{rows.pixels0, width, rows.height}, source1{rows.pixels1, width1, rows.height};
@@ -138,13 +133,11 @@ void match_rows(const RowPair& rows, const tvk_dense_table& kernels, Arena& aren
     codes_of(source0, kernels, y, tolerance, brighter0, darker0);
     codes_of(source1, kernels, y, tolerance, brighter1, darker1);
     kernels.edge_costs(row0, above, width, large, across);
-    const tvk_dense_row row = {width,  count, brighter0, darker0, brighter1, darker1, row0, large,
-                               across, costs, sums,      before,  after,     least,   ends};
-    kernels.sum_down(&row);
-    kernels.sum_across(&row);
+    const tvk_dense_row row = {width, count,  brighter0, darker0, brighter1,   darker1, row0,
+                               large, across, costs,     sums,    above_costs, least,   scratch};
+    kernels.sum_ahead(&row);
     int16_t* const found = steps.row(y);
     kernels.choose_steps(&row, found, chosen, margin, least1);
-    std::swap(before, after);
     for (int32_t x = 0; x < width; ++x) {
       const int32_t k = found[x];
       const bool good = row0[x] != 0 && k > 0 && k < rows.range_steps - 1 && row1[x + k] != 0 &&

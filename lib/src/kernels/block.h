@@ -24,6 +24,7 @@ static inline block block_less(block a, block b) { return _mm256_sub_epi8(a, b);
 static inline block block_or(block a, block b) { return _mm256_or_si256(a, b); }
 static inline block block_xor(block a, block b) { return _mm256_xor_si256(a, b); }
 static inline block block_equal(block a, block b) { return _mm256_cmpeq_epi8(a, b); }
+static inline block block_without(block a, block b) { return _mm256_andnot_si256(b, a); }
 static inline block block_bits(block v) {
   const block counts = _mm256_setr_epi8(0, 1, 1, 2, 1, 2, 2, 3, 1, 2, 2, 3, 2, 3, 3, 4, 0, 1, 1, 2,
                                         1, 2, 2, 3, 1, 2, 2, 3, 2, 3, 3, 4);
@@ -73,10 +74,19 @@ static inline void block_store_words(uint32_t *p, const block v[4]) {
   block_store((uint8_t *)(p + 16), _mm256_permute2x128_si256(a, b, 0x31));
   block_store((uint8_t *)(p + 24), _mm256_permute2x128_si256(c, d, 0x31));
 }
-static inline uint8_t block_lowest(block v) {
+static inline block block_lowest(block v) {
   __m128i m = _mm_min_epu8(_mm256_castsi256_si128(v), _mm256_extracti128_si256(v, 1));
-  m = _mm_min_epu8(m, _mm_srli_epi16(m, 8));
-  return (uint8_t)_mm_cvtsi128_si32(_mm_minpos_epu16(_mm_and_si128(m, _mm_set1_epi16(255))));
+  m = _mm_min_epu8(m, _mm_srli_epi16(m, 8)); /* the upper byte of each word is then 0 */
+  return _mm256_broadcastb_epi8(_mm_minpos_epu16(m));
+}
+static inline uint8_t block_value(block v) {
+  return (uint8_t)_mm_cvtsi128_si32(_mm256_castsi256_si128(v));
+}
+static inline block block_one_up(block v, block behind) {
+  return _mm256_alignr_epi8(v, _mm256_permute2x128_si256(behind, v, 0x21), 15);
+}
+static inline block block_one_down(block v, block ahead) {
+  return _mm256_alignr_epi8(_mm256_permute2x128_si256(v, ahead, 0x21), v, 1);
 }
 /* The first byte that is not 0, or -1. */
 static inline int block_first(block v) {
@@ -105,14 +115,23 @@ HALF(less, vsubq_u8)
 HALF(or, vorrq_u8)
 HALF(xor, veorq_u8)
 HALF(equal, vceqq_u8)
+HALF(without, vbicq_u8)
 static inline half half_bits(half v) { return vcntq_u8(v); }
-static inline uint8_t block_lowest(block v) {
+static inline block block_lowest(block v) {
   const half both = vminq_u8(v.a, v.b);
   uint8x8_t m = vpmin_u8(vget_low_u8(both), vget_high_u8(both));
   m = vpmin_u8(m, m);
   m = vpmin_u8(m, m);
   m = vpmin_u8(m, m);
-  return vget_lane_u8(m, 0);
+  const half all = vdupq_lane_u8(m, 0);
+  return (block){all, all};
+}
+static inline uint8_t block_value(block v) { return vgetq_lane_u8(v.a, 0); }
+static inline block block_one_up(block v, block behind) {
+  return (block){vextq_u8(behind.b, v.a, 15), vextq_u8(v.a, v.b, 15)};
+}
+static inline block block_one_down(block v, block ahead) {
+  return (block){vextq_u8(v.a, v.b, 1), vextq_u8(v.b, ahead.a, 1)};
 }
 static inline int block_first(block v) {
   uint8_t bytes[TVK_DENSE_BLOCK];
@@ -183,6 +202,7 @@ static inline block block_less(block a, block b) { EACH(a.at[i] - b.at[i]); }
 static inline block block_or(block a, block b) { EACH(a.at[i] | b.at[i]); }
 static inline block block_xor(block a, block b) { EACH(a.at[i] ^ b.at[i]); }
 static inline block block_equal(block a, block b) { EACH(a.at[i] == b.at[i] ? 255 : 0); }
+static inline block block_without(block a, block b) { EACH(a.at[i] & ~b.at[i]); }
 static inline block block_bits(block v) { EACH(__builtin_popcount(v.at[i])); }
 /* How many bits of each word differ from `other`; where the highest does, 0, and is_absent 255. */
 static inline block block_word_bits(const uint32_t *words, uint32_t other, block *is_absent) {
@@ -202,10 +222,19 @@ static inline void block_store_words(uint32_t *p, const block v[4]) {
            (uint32_t)v[3].at[i] << 24;
   }
 }
-static inline uint8_t block_lowest(block v) {
+/* The least entry, in each entry. */
+static inline block block_lowest(block v) {
   uint8_t least = v.at[0];
   for (int i = 1; i < TVK_DENSE_BLOCK; ++i) least = v.at[i] < least ? v.at[i] : least;
-  return least;
+  return block_of(least);
+}
+static inline uint8_t block_value(block v) { return v.at[0]; }
+/* Each entry one place farther up or down; the free one is taken from the block there. */
+static inline block block_one_up(block v, block behind) {
+  EACH(i > 0 ? v.at[i - 1] : behind.at[TVK_DENSE_BLOCK - 1]);
+}
+static inline block block_one_down(block v, block ahead) {
+  EACH(i < TVK_DENSE_BLOCK - 1 ? v.at[i + 1] : ahead.at[0]);
 }
 static inline int block_first(block v) {
   for (int i = 0; i < TVK_DENSE_BLOCK; ++i)

@@ -14,17 +14,17 @@ extern "C" {
 
 enum {
   TVK_DENSE_BLOCK = 32,       /* steps in a block of costs; lines have whole blocks */
-  TVK_DENSE_PAD = 32,         /* entries before and behind a line of path costs */
   TVK_DENSE_CENSUS_REACH = 2, /* pixels around the middle of the census window */
   TVK_DENSE_PATHS = 3,
-  TVK_DENSE_SMALL = 4,   /* the cost of a change of parallax by one step along a path */
-  TVK_DENSE_LARGE = 32,  /* of a change by more, where the image has no edge */
-  TVK_DENSE_NEVER = 200, /* above every cost of a path */
-  TVK_DENSE_REACH = 3,   /* cells around the middle of a window of least squares */
-  TVK_DENSE_SUMS = 10,   /* of such a window */
-  TVK_DENSE_NODES = 8,   /* columns between two at which the lens is evaluated */
-  TVK_DENSE_SPAN = 16,   /* columns of a block of cells */
-  TVK_SWEEP_ACROSS = 4,  /* pixels of the map around the middle of a census of words */
+  TVK_DENSE_SMALL = 4,    /* the cost of a change of parallax by one step along a path */
+  TVK_DENSE_LARGE = 32,   /* of a change by more, where the image has no edge */
+  TVK_DENSE_NEVER = 200,  /* above every cost of a path */
+  TVK_DENSE_REACH = 3,    /* cells around the middle of a window of least squares */
+  TVK_DENSE_SUMS = 10,    /* of such a window */
+  TVK_DENSE_NODES = 8,    /* columns between two at which the lens is evaluated */
+  TVK_DENSE_SPAN = 16,    /* columns of a block of cells */
+  TVK_DENSE_STRETCH = 64, /* columns whose windows are taken together: whole blocks */
+  TVK_SWEEP_ACROSS = 4,   /* pixels of the map around the middle of a census of words */
   TVK_SWEEP_DOWN = 3,
   TVK_SWEEP_BITS = 31,  /* of such a census */
   TVK_SWEEP_CHANCE = 15 /* the cost of a plane at a place that no view shows, as chance gives it */
@@ -51,18 +51,18 @@ typedef struct tvk_swept_row {
   uint8_t *kept;            /* the same: sums of paths, to which those of these four are added */
   const uint8_t *across;    /* as of tvk_dense_row, with an entry behind the last column */
   const uint8_t *large[3];  /* of each column, from the columns x - 1, x, x + 1 of the row before */
-  const uint8_t *before[3]; /* path costs of that row, lines of count + 2 TVK_DENSE_PAD */
+  const uint8_t *before[3]; /* path costs of that row, count for each column */
   uint8_t *after[3];        /* and those of this row */
   const uint8_t *least_before[3]; /* of each column, the least of them */
   uint8_t *least_after[3];
-  uint8_t *scratch; /* 3 lines of count + 2 TVK_DENSE_PAD */
+  uint8_t *scratch; /* 2 count */
 } tvk_swept_row;
 
 /* The pixels of TVK_DENSE_NODES columns of a row, as polynomials of the column; none if the lens
    model is not smooth there. */
 typedef struct tvk_dense_span {
-  double u[4], v[4];
-  int32_t is_smooth, reserved;
+  double at[4][2];             /* coefficients of u and v */
+  int32_t is_smooth, reserved; /* 0 or 1 */
 } tvk_dense_span;
 
 /* Rows of cells around a row y, of `width` columns with TVK_DENSE_REACH more before and behind
@@ -76,7 +76,7 @@ typedef struct tvk_dense_rows {
   const uint8_t *is_cell[2 * TVK_DENSE_REACH + 2];
 } tvk_dense_rows;
 
-/* The numbers with which fit_row weighs. */
+/* The numbers with which fit_cells weighs. */
 typedef struct tvk_dense_model {
   float gain_prior; /* variance of a window, squared grey levels, at which its gain counts half */
   float excess_sq;  /* by which the variance of the residuals is multiplied */
@@ -95,10 +95,9 @@ typedef struct tvk_dense_row {
   const uint8_t *across; /* of each column x, the same between x - 1 and x */
   uint8_t *costs;        /* num_steps for each column */
   uint8_t *sums;         /* the same: the path costs added up */
-  const uint8_t *before; /* path costs of the row above, lines of num_steps + 2 TVK_DENSE_PAD */
-  uint8_t *after;        /* and those of this row */
-  uint8_t *least;        /* of each column, the least of them: read, then written */
-  uint8_t *ends;         /* scratch: 4 lines of num_steps + 2 TVK_DENSE_PAD */
+  uint8_t *above;        /* the same: the path costs of the row above, then those of this row */
+  uint8_t *least;        /* of each column, the least of them, likewise */
+  uint8_t *scratch;      /* 3 num_steps */
 } tvk_dense_row;
 
 /* The contract of each kernel. Rows of cells are read and written in whole blocks, of
@@ -115,28 +114,30 @@ typedef struct tvk_dense_row {
    edge_costs: of each column, the cost of a large change between the pixel and the one above, and
    the one on its left: TVK_DENSE_LARGE less their difference, at least TVK_DENSE_SMALL.
 
-   sum_down: writes the costs of each column's steps, the number of bits in which the codes differ,
-   0 where grey0 is 0; continues the path from above, and writes its costs to `sums`.
+   sum_ahead: writes the costs of each column's steps, the number of bits in which the codes differ,
+   0 where grey0 is 0; continues the path from above, and writes the sums of its costs and of those
+   of the path from the left to `sums`.
 
-   sum_across: adds the paths from the left and from the right to `sums`.
-
-   choose_steps: of each column, the step of the least sum, the first of several; that sum; and how
-   much more the least sum of any step has that is not its neighbour. least1: for each column of
-   image 1, of which there are width + num_steps - 1, the least sum of the steps that lead there.
-   A column whose grey0 is 0 has zeros, and does not count in least1.
+   choose_steps: adds the path from the right to `sums`. Of each column, the step of the least sum,
+   the first of several; that sum; and how much more the least sum of any step has that is not its
+   neighbour. least1: for each column of image 1, of which there are width + num_steps - 1, the
+   least sum of the steps that lead there. A column whose grey0 is 0 has zeros, and does not count
+   in least1.
 
    support_row: rows[0..6] are rows of steps, -1 where there is none, y - 3 .. y + 3, of `width`
    columns with TVK_DENSE_REACH more before and behind them. How many of a column's 5 x 5
    neighbours, itself included, have the same step to within one; how many of its 7 x 7 neighbours;
    and the sum of the differences to it of the latter.
 
-   cell_sums: of the cells in a window of 7 x 7 around each column, with a, b and g of
-   tvk_dense_rows, writes the sums of a, b, g, aa, bb, gg, ab, ag, bg, and their number, in this
-   order, each to an array of `pitch`, a multiple of TVK_DENSE_SPAN that holds the width and its
-   frame. columns: scratch of as many arrays of TVK_DENSE_SPAN entries more each, those of the row
-   above unless `first`.
+   cell_columns: of the cells in the rows of a window of 7 rows, with a, b and g of tvk_dense_rows,
+   the sums over each column of a, b, g, aa, bb, gg, ab, ag, bg, and their number, in this order,
+   each in an array of `pitch`, a multiple of TVK_DENSE_SPAN that holds the width and its frame, and
+   TVK_DENSE_SPAN entries more: from those of the row above unless `first`.
 
-   fit_row: from these sums, what support_row wrote and the steps, writes the parallax of each
+   cell_sums: the same sums over windows of 7 x 7, whose first columns are `columns`, each in an
+   array of TVK_DENSE_STRETCH.
+
+   fit_cells: from these sums, what support_row wrote and the steps, writes the parallax of each
    column in steps, its standard deviation, and 255 times the correlation of the windows, at least 1
    (dense/fraction.h); both windows count as having `gain_prior`
    more variance that is alike, and those that would have to move by more than a step as unlike.
@@ -145,12 +146,12 @@ typedef struct tvk_dense_row {
    1 along both axes, rounded, at least 1. 0 where the pixel is 0, and the pixel itself in the first
    and the last column.
 
-   place_span: the polynomials of a span at 0 .. TVK_DENSE_NODES - 1, in units of 1/65536 pixel of
+   place_row: the polynomials of each span at 0 .. TVK_DENSE_NODES - 1, in units of 1/65536 pixel of
    an image that is `scale` times as large: (p + 0.5) scale - 0.5. u is -1 where that is not in the
-   image.
+   image, and where the span is not smooth.
 
-   sample_span: the grey level of an image at each of `count` such places, by bilinear
-   interpolation, at least 1; 0 where u is negative.
+   sample_row: the grey level of an image at each of `count` such places, by bilinear interpolation,
+   at least 1; 0 where u is negative.
 
    census_words: rows[0..6] are every second row of a view, from 2 TVK_SWEEP_DOWN above to as many
    below. The census of each element, whose window has every second element: whether of each pair of
@@ -172,23 +173,22 @@ typedef struct tvk_dense_row {
      uint8_t *darker))                                                                            \
   X(edge_costs, void,                                                                             \
     (const uint8_t *row, const uint8_t *above, int32_t width, uint8_t *large, uint8_t *across))   \
-  X(sum_down, void, (const tvk_dense_row *row))                                                   \
-  X(sum_across, void, (const tvk_dense_row *row))                                                 \
+  X(sum_ahead, void, (const tvk_dense_row *row))                                                  \
   X(choose_steps, void,                                                                           \
     (const tvk_dense_row *row, int16_t *steps, uint8_t *least, uint8_t *margin, uint8_t *least1)) \
   X(support_row, void,                                                                            \
     (const int16_t *const *rows, int32_t width, uint8_t *support, uint8_t *alike, int8_t *slant)) \
-  X(cell_sums, void,                                                                              \
-    (const tvk_dense_rows *rows, int32_t pitch, int32_t first, int32_t *columns, int32_t *sums))  \
-  X(fit_row, void,                                                                                \
+  X(cell_columns, void,                                                                           \
+    (const tvk_dense_rows *rows, int32_t pitch, int32_t first, int32_t *columns))                 \
+  X(cell_sums, void, (const int32_t *columns, int32_t pitch, int32_t *sums))                      \
+  X(fit_cells, void,                                                                              \
     (const int32_t *sums, const int16_t *steps, const uint8_t *alike, const int8_t *slant,        \
-     int32_t pitch, const tvk_dense_model *model, float *parallax, float *sigma,                  \
-     uint8_t *similarity))                                                                        \
+     const tvk_dense_model *model, float *parallax, float *sigma, uint8_t *similarity))           \
   X(smooth_row, void, (const uint8_t *const *rows, int32_t width, uint8_t *out))                  \
-  X(place_span, void,                                                                             \
-    (const tvk_dense_span *span, double scale, int32_t width, int32_t height, int32_t *u,         \
-     int32_t *v))                                                                                 \
-  X(sample_span, void,                                                                            \
+  X(place_row, void,                                                                              \
+    (const tvk_dense_span *spans, int32_t num_spans, double scale, int32_t width, int32_t height, \
+     int32_t *u, int32_t *v))                                                                     \
+  X(sample_row, void,                                                                             \
     (const uint8_t *image, int32_t width, int32_t height, int64_t stride, const int32_t *u,       \
      const int32_t *v, int32_t count, uint8_t *out))                                              \
   X(census_words, void, (const uint8_t *const *rows, int32_t width, uint32_t *census))            \

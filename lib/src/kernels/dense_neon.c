@@ -6,7 +6,7 @@
 /* Compilers for 32-bit ARM leave floating point to the scalar VFP, since NEON's is not IEEE's:
    there the kernels over floating point are those of the C set. */
 #define TVK_NO_FLOATS
-#define tvk_fit_row_neon tvk_fit_row_c
-#define tvk_place_span_neon tvk_place_span_c
+#define tvk_fit_cells_neon tvk_fit_cells_c
+#define tvk_place_row_neon tvk_place_row_c
 #endif
 #include "kernels/dense_impl.h"

@@ -54,123 +54,122 @@ void TVK_DENSE(edge_costs)(const uint8_t *row, const uint8_t *above, int32_t wid
   }
 }
 
-/* One step of a path for a block: `before` of the pixel before, whose least is least_before. */
-static inline block follow(block cost, const uint8_t *before, block least_before, block jump) {
-  block way = block_least(block_load(before - 1), block_load(before + 1));
+/* A path at a column: what follow needs of the column before, block by block. */
+typedef struct path {
+  block base, jump;         /* the least cost of the column before, and with a large change added */
+  block behind, own, least; /* its blocks at k - TVK_DENSE_BLOCK and k; the least cost from here */
+} path;
+
+static inline path path_from(const uint8_t *line, block least_before, uint8_t large) {
+  const block never = block_of(TVK_DENSE_NEVER);
+  return (path){least_before, block_add(least_before, block_of(large)), never, block_load(line),
+                never};
+}
+
+/* The costs of a path at a block of steps, those of the column before in `line`. Blocks are taken
+   in their order, and the next may be written to the same place. */
+static inline block follow(path *p, block cost, const uint8_t *line, int32_t k, int32_t count) {
+  const int32_t next = k + TVK_DENSE_BLOCK;
+  const block ahead = next < count ? block_load(line + next) : block_of(TVK_DENSE_NEVER);
+  block way = block_least(block_one_up(p->own, p->behind), block_one_down(p->own, ahead));
   way = block_add(way, block_of(TVK_DENSE_SMALL));
-  way = block_least(block_least(block_load(before), way), jump);
-  return block_add(block_less(way, least_before), cost);
+  way = block_least(block_least(p->own, way), p->jump);
+  way = block_add(way, block_less(cost, p->base));
+  p->behind = p->own;
+  p->own = ahead;
+  p->least = block_least(p->least, way);
+  return way;
 }
 
-/* Adds a step of a path to the sums of a column. Returns the least cost of the path. */
-static TVK_NOINLINE uint8_t follow_line(const uint8_t *cost, const uint8_t *before,
-                                        uint8_t least_before, uint8_t large, int32_t count,
-                                        uint8_t *after, uint8_t *sum) {
-  const block base = block_of(least_before), jump = block_of((uint8_t)(least_before + large));
-  block least = block_of(TVK_DENSE_NEVER);
-  for (int32_t k = 0; k < count; k += TVK_DENSE_BLOCK) {
-    const block way = follow(block_load(cost + k), before + k, base, jump);
-    block_store(after + k, way);
-    block_store(sum + k, block_add(block_load(sum + k), way));
-    least = block_least(least, way);
-  }
-  return block_lowest(least);
-}
-
-void TVK_DENSE(sum_down)(const tvk_dense_row *row) {
-  const int32_t count = row->num_steps, pitch = count + 2 * TVK_DENSE_PAD;
+/* The path from the left waits for its own pixel before; the costs and the path from above fill
+   its pauses. */
+void TVK_DENSE(sum_ahead)(const tvk_dense_row *row) {
+  const int32_t count = row->num_steps;
+  uint8_t *const line = row->scratch;
+  block least = block_of(0);
+  memset(line, 0, (size_t)count);
   for (int32_t x = 0; x < row->width; ++x) {
     uint8_t *const cost = row->costs + (ptrdiff_t)x * count;
     uint8_t *const sum = row->sums + (ptrdiff_t)x * count;
-    const uint8_t *const before = row->before + (ptrdiff_t)x * pitch + TVK_DENSE_PAD;
-    uint8_t *const after = row->after + (ptrdiff_t)x * pitch + TVK_DENSE_PAD;
+    uint8_t *const above = row->above + (ptrdiff_t)x * count;
     const block brighter = block_of(row->brighter0[x]), darker = block_of(row->darker0[x]);
-    memset(sum, 0, (size_t)count);
-    memset(cost, 0, (size_t)count);
-    for (int32_t k = 0; k < count && row->grey0[x] != 0; k += TVK_DENSE_BLOCK) {
-      block_store(cost + k,
-                  block_add(block_bits(block_xor(brighter, block_load(row->brighter1 + x + k))),
-                            block_bits(block_xor(darker, block_load(row->darker1 + x + k)))));
+    const block is_outside = block_equal(block_of(row->grey0[x]), block_of(0));
+    path left = path_from(line, least, x > 0 ? row->across[x] : TVK_DENSE_LARGE);
+    path down = path_from(above, block_of(row->least[x]), row->large[x]);
+    for (int32_t k = 0; k < count; k += TVK_DENSE_BLOCK) {
+      block bits = block_add(block_bits(block_xor(brighter, block_load(row->brighter1 + x + k))),
+                             block_bits(block_xor(darker, block_load(row->darker1 + x + k))));
+      bits = block_without(bits, is_outside);
+      block_store(cost + k, bits);
+      const block way = follow(&down, bits, above, k, count);
+      block_store(above + k, way);
+      const block other = follow(&left, bits, line, k, count);
+      block_store(line + k, other);
+      block_store(sum + k, block_add(way, other));
     }
-    row->least[x] = follow_line(cost, before, row->least[x], row->large[x], count, after, sum);
+    least = block_lowest(left.least);
+    row->least[x] = block_value(block_lowest(down.least));
   }
 }
 
-void TVK_DENSE(sum_across)(const tvk_dense_row *row) {
-  const int32_t count = row->num_steps, pitch = count + 2 * TVK_DENSE_PAD, width = row->width;
-  uint8_t *line[4];
-  uint8_t least_left = 0, least_right = 0;
-  for (int n = 0; n < 4; ++n) {
-    line[n] = row->ends + (ptrdiff_t)n * pitch + TVK_DENSE_PAD;
-    memset(line[n] - TVK_DENSE_PAD, TVK_DENSE_NEVER, (size_t)pitch);
+/* The first entry of the least sum, `low`. */
+static inline int32_t first_of(const uint8_t *sum, int32_t count, block low) {
+  int32_t at = 0;
+  for (int32_t k = count - TVK_DENSE_BLOCK; k >= 0; k -= TVK_DENSE_BLOCK) {
+    const int first = block_first(block_equal(block_load(sum + k), low));
+    at = first < 0 ? at : k + first;
   }
-  memset(line[1], 0, (size_t)count);
-  memset(line[3], 0, (size_t)count);
-  /* Both at once: each waits for its own pixel before, so one fills the other's pauses. */
-  for (int32_t x = 0; x < width; ++x) {
-    const int32_t u = width - 1 - x;
-    const uint8_t left = x > 0 ? row->across[x] : TVK_DENSE_LARGE;
-    const uint8_t right = x > 0 ? row->across[u + 1] : TVK_DENSE_LARGE;
-    least_left = follow_line(row->costs + (ptrdiff_t)x * count, line[1 - (x & 1)], least_left, left,
-                             count, line[x & 1], row->sums + (ptrdiff_t)x * count);
-    least_right = follow_line(row->costs + (ptrdiff_t)u * count, line[3 - (x & 1)], least_right,
-                              right, count, line[2 + (x & 1)], row->sums + (ptrdiff_t)u * count);
-  }
-}
-
-static TVK_NOINLINE uint8_t lowest_of(const uint8_t *sum, int32_t count) {
-  block low = block_of(255);
-  for (int32_t k = 0; k < count; k += TVK_DENSE_BLOCK) low = block_least(low, block_load(sum + k));
-  return block_lowest(low);
-}
-
-/* The first entry of the least sum; and by how much the least sum is larger of those that are more
-   than `reach` entries away. */
-static TVK_NOINLINE int32_t choose(const uint8_t *sum, int32_t count, int32_t reach,
-                                   uint8_t *lowest, uint8_t *margin) {
-  static const uint8_t number[TVK_DENSE_BLOCK] = {0,  1,  2,  3,  4,  5,  6,  7,  8,  9,  10,
-                                                  11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21,
-                                                  22, 23, 24, 25, 26, 27, 28, 29, 30, 31};
-  const block numbers = block_load(number), span = block_of((uint8_t)(2 * reach));
-  *lowest = lowest_of(sum, count);
-  const block low = block_of(*lowest);
-  block next = block_of(255);
-  int32_t at = 0, first;
-  while ((first = block_first(block_equal(block_load(sum + at), low))) < 0) at += TVK_DENSE_BLOCK;
-  at += first;
-  for (int32_t k = 0; k < count; k += TVK_DENSE_BLOCK) {
-    /* Of the block, the entries from `begin` on, 2 reach + 1 of them, are the winner's. */
-    const int32_t begin = at - reach - k;
-    const uint8_t own = (uint8_t)(begin < -2 * reach || begin >= TVK_DENSE_BLOCK ? 128 : begin);
-    const block behind = block_less(numbers, block_of(own));
-    const block without = block_equal(block_least(behind, span), behind);
-    next = block_least(next, block_or(block_load(sum + k), without));
-  }
-  *margin = (uint8_t)(block_lowest(next) - *lowest);
   return at;
+}
+
+/* 255 where entry k + i is at most `reach` away from entry `at`, 0 elsewhere. */
+static inline block block_near(int32_t at, int32_t k, int32_t reach) {
+  enum { BLOCK = TVK_DENSE_BLOCK };
+  static const uint8_t three[2 * BLOCK + 3] = {[BLOCK] = 255, 255, 255};
+  static const uint8_t five[2 * BLOCK + 5] = {[BLOCK] = 255, 255, 255, 255, 255};
+  const uint8_t *const table = reach == 1 ? three : five;
+  int32_t begin = BLOCK + k + reach - at;
+  begin = begin < 0 ? 0 : begin;
+  return block_load(table + (begin < BLOCK + 2 * reach + 1 ? begin : 0));
 }
 
 void TVK_DENSE(choose_steps)(const tvk_dense_row *row, int16_t *steps, uint8_t *least,
                              uint8_t *margin, uint8_t *least1) {
-  enum { STRETCHES = 8 };
   const int32_t count = row->num_steps, width = row->width;
-  memset(least1, 255, (size_t)(width + count - 1));
-  /* Columns in an order in which neighbours are far apart: what one stores in least1 the next would
-     load at another alignment, and wait for. */
-  const int32_t stretch = (width + STRETCHES - 1) / STRETCHES;
-  for (int32_t n = 0; n < stretch * STRETCHES; ++n) {
-    const int32_t x = n % STRETCHES * stretch + n / STRETCHES;
-    if (x >= width) continue;
-    if (row->grey0[x] == 0) { /* Nothing is known of its sums: they must not count in least1. */
-      steps[x] = 0;
-      least[x] = margin[x] = 0;
-      continue;
-    }
-    const uint8_t *const sum = row->sums + (ptrdiff_t)x * count;
-    uint8_t *const other = least1 + x;
+  /* others: the least sums of the columns x .. x + count - 1 of image 1. */
+  uint8_t *const line = row->scratch, *const others = line + count, *const none = others + count;
+  block least_before = block_of(0);
+  memset(line, 0, (size_t)count);
+  memset(others, 255, (size_t)count);
+  memset(none, 255, (size_t)count);
+  for (int32_t x = width - 1; x >= 0; --x) {
+    const uint8_t *const cost = row->costs + (ptrdiff_t)x * count;
+    uint8_t *const sum = row->sums + (ptrdiff_t)x * count;
+    path left = path_from(line, least_before, x < width - 1 ? row->across[x + 1] : TVK_DENSE_LARGE);
+    block low = block_of(255), next = low, behind = low;
     for (int32_t k = 0; k < count; k += TVK_DENSE_BLOCK) {
-      block_store(other + k, block_least(block_load(other + k), block_load(sum + k)));
+      const block way = follow(&left, block_load(cost + k), line, k, count);
+      const block all = block_add(block_load(sum + k), way);
+      block_store(line + k, way);
+      block_store(sum + k, all);
+      low = block_least(low, all);
     }
-    steps[x] = (int16_t)choose(sum, count, 1, least + x, margin + x);
+    least_before = block_lowest(left.least);
+    low = block_lowest(low);
+    if (x < width - 1) least1[x + count] = others[count - 1];
+    const int is_known = row->grey0[x] != 0;
+    const uint8_t *const counted = is_known ? sum : none;
+    const int32_t at = first_of(sum, count, low);
+    for (int32_t k = 0; k < count; k += TVK_DENSE_BLOCK) {
+      const block own = block_load(others + k);
+      block_store(others + k, block_least(block_one_up(own, behind), block_load(counted + k)));
+      behind = own;
+      next = block_least(next, block_or(block_load(sum + k), block_near(at, k, 1)));
+    }
+    const uint8_t lowest = block_value(low), second = block_value(block_lowest(next));
+    steps[x] = (int16_t)(is_known ? at : 0);
+    least[x] = is_known ? lowest : 0;
+    margin[x] = is_known ? (uint8_t)(second - lowest) : 0;
   }
+  memcpy(least1, others, (size_t)count);
 }

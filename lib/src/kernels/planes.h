@@ -87,30 +87,40 @@ void TVK_DENSE(plane_costs)(const tvk_swept_view *views, int32_t num_views, cons
 }
 
 void TVK_DENSE(sum_planes)(const tvk_swept_row *row) {
-  const int32_t count = row->count, pitch = count + 2 * TVK_DENSE_PAD, last = row->width - 1;
-  uint8_t *const sums = row->scratch, *line[2];
-  uint8_t least = 0;
-  for (int n = 0; n < 2; ++n) {
-    line[n] = row->scratch + (ptrdiff_t)(n + 1) * pitch + TVK_DENSE_PAD;
-    memset(line[n] - TVK_DENSE_PAD, TVK_DENSE_NEVER, (size_t)pitch);
-  }
-  memset(line[1], 0, (size_t)count);
+  const int32_t count = row->count, last = row->width - 1;
+  uint8_t *const line = row->scratch, *const sums = row->scratch + count;
+  block least = block_of(0);
+  memset(line, 0, (size_t)count);
   for (int32_t i = 0; i <= last; ++i) {
     const int32_t x = row->step > 0 ? i : last - i;
     const uint8_t *const cost = row->costs + (ptrdiff_t)x * count;
     uint8_t *const kept = row->kept + (ptrdiff_t)x * count;
-    memset(sums, 0, (size_t)count);
     /* Where the path begins, all of its costs are equal, and a change costs nothing. */
-    const uint8_t across = row->across[row->step > 0 ? x : x + 1];
-    least = follow_line(cost, line[1 - (i & 1)], least, across, count, line[i & 1], sums);
+    path across = path_from(line, least, row->across[row->step > 0 ? x : x + 1]), down[3];
+    const uint8_t *before[3];
+    uint8_t *after[3];
     for (int p = 0; p < 3; ++p) {
       const int32_t from = x + p < 1 ? 0 : x + p - 1 < last ? x + p - 1 : last;
-      row->least_after[p][x] =
-          follow_line(cost, row->before[p] + (ptrdiff_t)from * pitch + TVK_DENSE_PAD,
-                      row->least_before[p][from], row->large[p][x], count,
-                      row->after[p] + (ptrdiff_t)x * pitch + TVK_DENSE_PAD, sums);
+      before[p] = row->before[p] + (ptrdiff_t)from * count;
+      after[p] = row->after[p] + (ptrdiff_t)x * count;
+      down[p] = path_from(before[p], block_of(row->least_before[p][from]), row->large[p][x]);
     }
-    const block low = block_of(lowest_of(sums, count));
+    block low = block_of(255);
+    for (int32_t k = 0; k < count; k += TVK_DENSE_BLOCK) {
+      const block bits = block_load(cost + k);
+      block sum = follow(&across, bits, line, k, count);
+      block_store(line + k, sum);
+      for (int p = 0; p < 3; ++p) {
+        const block way = follow(&down[p], bits, before[p], k, count);
+        block_store(after[p] + k, way);
+        sum = block_add(sum, way);
+      }
+      block_store(sums + k, sum);
+      low = block_least(low, sum);
+    }
+    least = block_lowest(across.least);
+    low = block_lowest(low);
+    for (int p = 0; p < 3; ++p) row->least_after[p][x] = block_value(block_lowest(down[p].least));
     for (int32_t k = 0; k < count; k += TVK_DENSE_BLOCK) {
       const block more = block_less(block_load(sums + k), low);
       block_store(kept + k, block_sum(block_load(kept + k), more));
@@ -121,8 +131,17 @@ void TVK_DENSE(sum_planes)(const tvk_swept_row *row) {
 void TVK_DENSE(choose_planes)(const uint8_t *sums, int32_t width, int32_t count, int16_t *planes,
                               uint8_t *margin) {
   for (int32_t x = 0; x < width; ++x) {
-    uint8_t lowest;
-    const int32_t at = choose(sums + (ptrdiff_t)x * count, count, 2, &lowest, margin + x);
+    const uint8_t *const sum = sums + (ptrdiff_t)x * count;
+    block low = block_of(255), next = low;
+    for (int32_t k = 0; k < count; k += TVK_DENSE_BLOCK) {
+      low = block_least(low, block_load(sum + k));
+    }
+    low = block_lowest(low);
+    const int32_t at = first_of(sum, count, low);
+    for (int32_t k = 0; k < count; k += TVK_DENSE_BLOCK) {
+      next = block_least(next, block_or(block_load(sum + k), block_near(at, k, 2)));
+    }
     planes[x] = (int16_t)at;
+    margin[x] = (uint8_t)(block_value(block_lowest(next)) - block_value(low));
   }
 }
