@@ -28,7 +28,8 @@ endif()
 # forgotten #include. A launcher turns this off, because ccache would not keep the objects. clang
 # refuses the headers where a source has options of its own that change code.
 # tv_precompile(target REUSE_FROM other) takes those of a target with the same flags;
-# tv_precompile(target ALWAYS header...) is for sources that another target compiles without.
+# tv_precompile(target ALWAYS header...) does so in every build without a launcher; a build with one
+# finds a forgotten #include.
 option(TWOVIEW_PRECOMPILE "Parse the headers of Eigen once, in release builds too" OFF)
 mark_as_advanced(TWOVIEW_PRECOMPILE)
 function(tv_precompile target)
