@@ -447,7 +447,8 @@ class RoomTest(CliTest):
 
     def test_poses_that_the_pictures_contradict_are_refused(self):
         """The true path in a world that is turned: the cameras all have one rotation, and go along
-        their x. Written as other programs do, each file is another path."""
+        their x. Written as other programs do, each file is another path, and so is one that goes
+        along their z."""
         turn = np.radians(100)
         axis = np.array([1, 2, 3]) / math.sqrt(14)
         x, y, z = math.sin(turn / 2) * axis
@@ -466,7 +467,7 @@ class RoomTest(CliTest):
         for words, rotation, at in (
                 ("quaternions with w first", (w, x, y, z), places),
                 ("camera_from_world", (-x, -y, -z, w), [-R.T @ p for p in places]),
-                ("of these frames", (x, y, z, w), places[::-1])):
+                ("of these frames", (x, y, z, w), [STEP * k * R[:, 2] for k in range(COUNT)])):
             with self.subTest(words):
                 poses = file(rotation, at, "wrong.txt")
                 done = self.room("--poses", poses, folder=self.source, out=other)

@@ -79,6 +79,12 @@ void refine_stretch(const int16_t* const* around, const uint8_t* is_cell, const 
   }
 }
 
+bool has_cell(const uint8_t* is_cell, int32_t count) {
+  uint8_t any = 0;
+  for (int32_t x = 0; x < count; ++x) any |= is_cell[x];
+  return any != 0;
+}
+
 }  // namespace
 
 size_t refine_rows_bytes(int32_t width) {
@@ -122,7 +128,7 @@ void refine_rows(const RowPair& rows, const Steps& steps, const tvk_dense_table&
     for (int32_t x = 0; x < width; x += kStretch) {
       const DenseCells out = cells.from(static_cast<ptrdiff_t>(y) * width + x);
       const int32_t count = std::min(kStretch, width - x);
-      if (std::memchr(is_cell + x, 1, static_cast<size_t>(count)) == nullptr) {
+      if (!has_cell(is_cell + x, count)) {
         std::fill(out.parallax, out.parallax + count, -1.0f);
         continue;
       }

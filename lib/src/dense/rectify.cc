@@ -392,6 +392,7 @@ void Track::go_to_row(int32_t y) {
     has[3] = has[3] && std::fabs(at[3][0]) < widest && std::fabs(at[3][1]) < widest;
     if (n < 0) continue;
     tvk_dense_span& span = spans_[n];
+    span = tvk_dense_span{};
     span.is_smooth = has[0] && has[1] && has[2] && has[3];
     if (!span.is_smooth) continue;
     for (int i = 0; i < 2; ++i) {

@@ -61,7 +61,7 @@ typedef struct tvk_swept_row {
 /* The pixels of TVK_DENSE_NODES columns of a row, as polynomials of the column; none if the lens
    model is not smooth there. */
 typedef struct tvk_dense_span {
-  double at[4][2];             /* coefficients of u and v */
+  double at[4][2];             /* coefficients of u and v; 0 where it is not smooth */
   int32_t is_smooth, reserved; /* 0 or 1 */
 } tvk_dense_span;
 
