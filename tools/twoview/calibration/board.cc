@@ -16,6 +16,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "base/error.h"
+#include "base/median.h"
 
 namespace cli {
 namespace {
@@ -391,11 +392,10 @@ void reject_blurred(std::vector<BoardView>& views) {
   for (const BoardView& view : views)
     if (view.is_used()) rises.push_back(view.edge_rise_px);
   if (rises.empty()) return;
-  std::nth_element(rises.begin(), rises.begin() + rises.size() / 2, rises.end());
   // A view is blurred if its edges are wider than kMaxRiseOfMedian times the median; but never if
   // they are at most kMaxRisePx wide, since sharp views may differ by more than that ratio; and
   // always if they are wider than twice kMaxRisePx, since all views may be blurred.
-  const double limit = std::max(kMaxRisePx, kMaxRiseOfMedian * rises[rises.size() / 2]);
+  const double limit = std::max(kMaxRisePx, kMaxRiseOfMedian * median_of(rises));
   for (BoardView& view : views) {
     if (!view.is_used() || view.edge_rise_px <= std::min(limit, 2 * kMaxRisePx)) continue;
     view.reason = Reason::kBlurred;

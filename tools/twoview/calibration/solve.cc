@@ -6,6 +6,7 @@
 #include <opencv2/calib3d.hpp>
 
 #include "base/error.h"
+#include "base/median.h"
 #include "calibration/two_cameras.h"
 
 namespace cli {
@@ -211,18 +212,12 @@ Calibration solve_once(const std::vector<BoardView>& views, const Board& board, 
   return result;
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 // Marks views whose error is above the limit of kOutlierRatio and kOutlierPx, the worst first, as
 // long as kMinViews and two thirds of num_at_first views remain. Returns true if a view was marked.
 bool reject_outliers(std::vector<BoardView>& views, Calibration& calibration, size_t num_at_first) {
   std::vector<double> errors;
   for (const ViewFit& fit : calibration.fits) errors.push_back(fit.rms_px);
-  const double usual = median(errors);
+  const double usual = median_of(errors);
   const double limit = std::max(kOutlierRatio * usual, usual + kOutlierPx);
   size_t left = calibration.fits.size();
   std::sort(calibration.fits.begin(), calibration.fits.end(),

@@ -1,5 +1,6 @@
 // twoview odometry SOURCE -o OUT: the frames of one camera to its path and a map.
 
+#include "base/median.h"
 #include "odometry/odometry_verb.h"
 
 #include <CLI/CLI.hpp>
@@ -470,9 +471,7 @@ double focal_by_exif(const FrameSource& source, double of_first, Common& common)
   constexpr double kRounding_mm = 1;  // EXIF gives whole millimetres
   std::vector<double> focals = source.focals_35mm();
   if (focals.empty()) focals.push_back(of_first);
-  const auto middle = focals.begin() + static_cast<std::ptrdiff_t>(focals.size() / 2);
-  std::nth_element(focals.begin(), middle, focals.end());
-  const double usual = *middle;
+  const double usual = median_of(focals);
   double other = 0;
   const auto differs = [&](double focal) {
     if (std::abs(focal - usual) <= kRounding_mm) return false;

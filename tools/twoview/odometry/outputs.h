@@ -63,8 +63,7 @@ std::string keyframes_text(const FlightResult& result);
 // none is.
 std::string covariances_text(const std::vector<FlightKeyframe>& keyframes);
 std::string frames_csv(const Flight& flight);
-// The words for a frame's reasons: those of the verdict, "unreadable" or
-// "repeated".
+// The words for a frame's reasons: those of the verdict, "unreadable" or "repeated".
 std::string reasons_text(const FlightFrame& frame);
 // The names of a frame's tv_map_reason bits, in lower case.
 std::string map_reasons_text(const FlightFrame& frame);

@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "base/error.h"
+#include "base/median.h"
 #include "base/output.h"
 #include "odometry/numbers.h"
 
@@ -42,9 +43,8 @@ void leave_out_zeros(const std::vector<bool>& is_zero, TruePoses& truth) {
       steps.push_back(step);
   }
   if (steps.empty() || nearest == HUGE_VAL) return;
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  if (!(*middle > 0 && nearest > kFar * *middle)) return;
+  const double usual = median_of(steps);
+  if (!(usual > 0 && nearest > kFar * usual)) return;
   Trajectory kept;
   for (size_t i = 0; i < poses.size(); ++i)
     if (!is_zero[i]) kept.push_back(poses[i]);

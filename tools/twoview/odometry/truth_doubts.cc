@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "base/median.h"
 #include "odometry/accuracy.h"
 
 namespace cli {
@@ -28,10 +29,7 @@ double turn_between(const Pose& a, const Pose& b) {
 double median_step(const Trajectory& path) {
   std::vector<double> steps;
   for (size_t i = 1; i < path.size(); ++i) steps.push_back(path[i].time_s - path[i - 1].time_s);
-  if (steps.empty()) return 0;
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
+  return steps.empty() ? 0 : median_of(steps);
 }
 
 std::vector<Stretch> stretches_of(const Trajectory& path, double frame_s) {

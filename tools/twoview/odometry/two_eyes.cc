@@ -4,6 +4,8 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "base/median.h"
+
 namespace cli {
 namespace {
 
@@ -44,11 +46,6 @@ bool is_found(const cv::Mat& patch, const cv::Mat& half, int x, int y) {
   double best = 0;
   cv::minMaxLoc(correlation, nullptr, &best);
   return best > kAlike;
-}
-
-double median_of(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
-  return values[values.size() / 2];
 }
 
 cv::Mat small_of(const cv::Mat& luma, int width) {
@@ -128,8 +125,7 @@ std::string TwoEyes::words() const {
   switch (layout()) {
     case EyesLayout::kSideBySide:
       return "the left and the right half of the pictures show the same scene, as films of two "
-             "eyes "
-             "do: give the pictures of one (ffmpeg -vf crop=iw/2:ih:0:0)";
+             "eyes do: give the pictures of one (ffmpeg -vf crop=iw/2:ih:0:0)";
     case EyesLayout::kTopBottom:
       return "the upper and the lower half of the pictures show the same scene, as films of two "
              "eyes do: give the pictures of one (ffmpeg -vf crop=iw:ih/2:0:0)";

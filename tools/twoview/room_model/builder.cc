@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "base/error.h"
+#include "base/median.h"
 #include "base/upright.h"
 #include "files/camera_file.h"
 #include "files/image_file.h"
@@ -33,14 +34,6 @@ double cpu_ms() {
   timespec time{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
   return 1e3 * static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_nsec);
-}
-
-// The median of the keyframes' median depths; 0 where none is known.
-double median_of(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // The number with two digits, which is what a scene says of a voxel that fits.
@@ -84,7 +77,8 @@ RoomBuilder::RoomBuilder(RoomScene scene, const RoomSettings& settings)
     ranges[k] = depth_range(scene_, scene_.views[k]);
     if (ranges[k].is_known()) depths.push_back(ranges[k].median);
   }
-  median_depth_ = median_of(depths);
+  // Of the keyframes' median depths; 0 where none is known.
+  median_depth_ = depths.empty() ? 0 : median_of(depths);
   for (const size_t k : choose_keyframes(scene_, median_depth_)) {
     Job job{k, {k}, k, ranges[k]};
     if (job.range.is_known())

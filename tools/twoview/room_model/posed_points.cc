@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "base/error.h"
+#include "base/median.h"
 #include "base/two_views.h"
 
 namespace cli {
@@ -155,9 +157,7 @@ std::optional<double> PosedPoints::median_error_px(const std::vector<Matrix3>& R
     }
   }
   if (num_pairs < kFewestPairs) return {};
-  const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
-  std::nth_element(errors.begin(), middle, errors.end());
-  return *middle;
+  return median_of(std::move(errors));
 }
 
 }  // namespace cli

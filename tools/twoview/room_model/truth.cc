@@ -8,8 +8,10 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 #include <unordered_set>
+#include <utility>
 
 #include "base/error.h"
+#include "base/median.h"
 
 namespace cli {
 namespace {
@@ -24,11 +26,9 @@ Vector3 sum_of(const Vector3& a, const Vector3& b) {
   return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
 }
 
-std::optional<double> median_of(std::vector<double> values) {
+std::optional<double> median_if_any(std::vector<double> values) {
   if (values.empty()) return {};
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  return median_of(std::move(values));
 }
 
 // Calls visit(i, x, y) for the places[i], of those that `todo` names, that a camera shows at the
@@ -148,8 +148,8 @@ TruthScores scores_of(const std::vector<JudgedPoint>& points, const TriangleTree
   scores.recall = share_or_none(missing).value_or(0);
   const double precision = scores.precision.value_or(0), sum = precision + scores.recall;
   if (sum > 0) scores.f = 2 * precision * scores.recall / sum;
-  scores.accuracy_median = median_of(all);
-  if (!room.is_empty()) scores.completeness_median = median_of(missing);
+  scores.accuracy_median = median_if_any(all);
+  if (!room.is_empty()) scores.completeness_median = median_if_any(missing);
   return scores;
 }
 
