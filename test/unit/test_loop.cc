@@ -12,6 +12,7 @@
 #include "odometry/loop.h"
 #include "odometry/map.h"
 #include "odometry/metric.h"
+#include "odometry/spread.h"
 
 namespace {
 
@@ -344,7 +345,7 @@ void test_a_frame_and_the_measured_way_move_with_their_keyframe() {
   frame.cam_from_world = reference->cam_from_world;
   tv::centre_of(reference->cam_from_world, odometry->travel.from);
   odometry->spread = {12, 0, 0, 0, 0};
-  while (odometry->spread.num_steps > 0) tv::spread_loop(odometry, &frame);
+  while (odometry->spread.num_steps > 0) tv::step_spread(odometry, &frame);
   double centre[3];
   tv::centre_of(reference->cam_from_world, centre);
   TEST_ASSERT_TRUE(tv::way_between(drifted(kReference), reference->cam_from_world) > 0.01);
@@ -354,7 +355,7 @@ void test_a_frame_and_the_measured_way_move_with_their_keyframe() {
   TEST_ASSERT_EQUAL_INT(0, odometry->spread.num_steps);
   TEST_ASSERT_TRUE(tv::is_spreading(*odometry));
   for (int i = 0; i < 10; ++i) {
-    if (tv::is_spreading(*odometry)) tv::spread_loop(odometry, &frame);
+    if (tv::is_spreading(*odometry)) tv::step_spread(odometry, &frame);
   }
   TEST_ASSERT_FALSE(tv::is_spreading(*odometry));
 }

@@ -191,7 +191,7 @@ void test_points_that_wait_are_those_of_one_call() {
   for (int call = 0; call < 2; ++call) {  // after the second one nothing is left
     tv::make_points(odometry, 4, odometry->frame, false);
     TEST_ASSERT_EQUAL_INT(num_points, map.num_points);
-    TEST_ASSERT_EQUAL_INT(4, odometry->next_neighbour);
+    TEST_ASSERT_EQUAL_INT(4, odometry->unfinished.next_neighbour);
     for (int k = 0; k < 5; ++k) {
       for (int n = 0; n < kNum; ++n) {
         TEST_ASSERT_EQUAL_INT(points[k][n], tv::seen_by(map, map.keyframes[k])[n]);

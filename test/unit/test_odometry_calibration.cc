@@ -11,6 +11,7 @@
 
 #include "odometry/loop.h"
 #include "odometry/map_check.h"
+#include "odometry/spread.h"
 #include "support/odometry_flight.h"
 #include "support/random.h"
 

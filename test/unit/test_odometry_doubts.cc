@@ -1,4 +1,4 @@
-// When the frames of a flight are "weak" because the map is in doubt (odometry/track.cc,
+// When the frames of a flight are "weak" because the map is in doubt (odometry/doubts.cc,
 // docs/algorithms/odometry.md, "The map is checked").
 
 #include <unity.h>

@@ -7,6 +7,7 @@
 #include "odometry/memory.h"
 #include "odometry/still.h"
 #include "odometry/track.h"
+#include "odometry/work.h"
 #include "pipeline/context.h"
 
 namespace tv {
@@ -156,7 +157,7 @@ tv_status tv_odometry_still_mask(const tv_odometry* odometry, uint8_t* mask, siz
 
 tv_status tv_odometry_finish(tv_odometry* odometry) {
   if (odometry == nullptr) return TV_ERR_NULL;
-  tv::finish_map(odometry);
+  tv::finish_work(odometry);
   return TV_OK;
 }
 

@@ -8,7 +8,7 @@
 #include "odometry/keyframe.h"
 #include "odometry/loop.h"
 #include "odometry/map_bytes.h"
-#include "odometry/track.h"
+#include "odometry/work.h"
 #include "twoview/odometry.h"
 
 namespace tv {
@@ -166,7 +166,7 @@ tv_status tv_odometry_add(tv_odometry* odometry, const uint8_t* bytes, size_t nu
   const int32_t num_keyframes = odometry->map.num_keyframes;
   const tv_status status = tv::read_map(bytes, num_bytes, false, odometry);
   if (status != TV_OK) return status;
-  tv::finish_map(odometry);
+  tv::finish_work(odometry);
   *num_joined = tv::join_segments(odometry, num_keyframes);
   return TV_OK;
 }

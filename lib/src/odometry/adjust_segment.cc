@@ -173,11 +173,6 @@ bool adjust_segment(Odometry* odometry, int32_t segment, int32_t first_id, int32
   return window.result.final_cost < (1 - kLeastGain) * window.result.initial_cost;
 }
 
-void begin_spread(Odometry* odometry, int32_t segment, int32_t first_id) {
-  const Map& map = odometry->map;
-  odometry->spread = {kSpreadSteps, 0, segment, first_id, map.keyframes[map.num_keyframes - 1].id};
-}
-
 int32_t adjust_points(Odometry* odometry, int32_t segment, int32_t first, int32_t max_iterations) {
   Arena arena = odometry->whole_scratch;
   const Map& map = odometry->map;

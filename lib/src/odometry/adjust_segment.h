@@ -16,12 +16,6 @@ size_t adjust_segment_bytes(const tv_odometry_options& options);
 // would change them further.
 bool adjust_segment(Odometry* odometry, int32_t segment, int32_t first_id, int32_t max_iterations);
 
-inline constexpr int32_t kSpreadSteps = 12;  // at most, of one adjustment that is spread
-
-// From the next frames on (odometry/loop.h) the keyframes of a segment from this id on are adjusted
-// together, and then its points. The map has keyframes.
-void begin_spread(Odometry* odometry, int32_t segment, int32_t first_id);
-
 // Adjusts the points of a segment from a place of the map on, as many as a window holds, and not
 // its keyframes; then forgets the observations that do not fit. Nothing changes where the segment
 // has more than 256 keyframes. Returns the place of the next point.

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "odometry/adjust_segment.h"
+#include "odometry/spread.h"
 
 namespace tv {
 namespace {

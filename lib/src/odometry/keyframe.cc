@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/order.h"
 #include "geometry/vector3.h"
 #include "odometry/adjust.h"
 #include "odometry/map_check.h"
@@ -91,7 +92,7 @@ void make_room(Odometry* odometry, int32_t wanted) {
 int32_t make_keyframe(Odometry* odometry, const Frame& frame) {
   Map& map = odometry->map;
   const int32_t idx = add_keyframe(&map, frame.keypoints, frame.descriptors, frame.num);
-  odometry->next_neighbour = 0;
+  odometry->unfinished.next_neighbour = 0;
   MapKeyframe* keyframe = &map.keyframes[idx];
   keyframe->segment = odometry->segment;
   keyframe->frame = frame.number;
@@ -181,7 +182,7 @@ int32_t triangulate_matches(Odometry* odometry, int32_t keyframe0, int32_t keyfr
 }
 
 void make_points(Odometry* odometry, int32_t keyframe, const Frame& frame, bool can_wait) {
-  int32_t* next = &odometry->next_neighbour;
+  int32_t* next = &odometry->unfinished.next_neighbour;
   if (*next == kMostNeighbours) return;
   ArenaScope scope(odometry->scratch);
   Arena& arena = odometry->scratch;
@@ -285,6 +286,26 @@ int32_t list_points(Odometry* odometry, int32_t keyframe, int32_t* points) {
 
 void list_local_points(Odometry* odometry, int32_t keyframe) {
   odometry->num_local_points = list_points(odometry, keyframe, odometry->local_points);
+}
+
+void take_keyframe(const Odometry& odometry, int32_t keyframe, Frame* frame) {
+  const MapKeyframe& own = odometry.map.keyframes[keyframe];
+  frame->cam_from_world = own.cam_from_world;
+  std::copy_n(seen_by(odometry.map, own), frame->num, frame->points);
+}
+
+void measure_depth(Odometry* odometry, const Frame& frame) {
+  ArenaScope scope(odometry->scratch);
+  double* depths = arena_alloc<double>(odometry->scratch, static_cast<size_t>(frame.num));
+  int32_t num = 0;
+  for (int32_t k = 0; k < frame.num; ++k) {
+    if (frame.points[k] == kNoPoint) continue;
+    double x[3];
+    transform(frame.cam_from_world, odometry->map.points[frame.points[k]].position, x);
+    depths[num++] = x[2];
+  }
+  if (num == 0) return;
+  odometry->median_depth = median(depths, num);
 }
 
 }  // namespace tv

@@ -12,6 +12,7 @@
 #include "odometry/keyframe.h"
 #include "odometry/metric.h"
 #include "odometry/search.h"
+#include "odometry/spread.h"
 #include "odometry/start.h"
 
 namespace tv {
@@ -40,9 +41,9 @@ constexpr double kLargestYaw = 0.2;
 constexpr double kFarthestSeen = 2, kMostTurned = 1.2;
 constexpr double kLeastScale = 0.6875, kLargestScale = 1.5;
 constexpr int32_t kJoinSteps = 20;  // of the adjustment around the keyframe where two maps meet
-// After a loop: steps of the adjustment of many keyframes, one at each frame, and of the points. At
-// least so many of the newest keyframes are adjusted, and all since the loop before.
-constexpr int32_t kPointSteps = 3, kLeastSpread = 100;
+// After a loop at least so many of the newest keyframes are adjusted together, and all since the
+// loop before.
+constexpr int32_t kLeastSpread = 100;
 // Smaller corrections are not spread: median depths, radians.
 constexpr double kLeastWay = 0.005, kLeastTurn = 0.005;
 constexpr double kMatchRatio = 0.87;
@@ -309,30 +310,6 @@ bool close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const 
   return segment == old_segment && is_jump(odometry, now, keyframe);
 }
 
-bool is_spreading(const Odometry& odometry) {
-  return odometry.spread.num_steps > 0 || odometry.spread.next_place < odometry.map.end_points;
-}
-
-void spread_loop(Odometry* odometry, Frame* frame) {
-  Spread* spread = &odometry->spread;
-  if (spread->num_steps == 0) {
-    spread->next_place = adjust_points(odometry, spread->segment, spread->next_place, kPointSteps);
-    return;
-  }
-  --spread->num_steps;
-  const int32_t k = find_keyframe(odometry->map, odometry->reference_id);
-  if (k < 0) return;
-  const MapKeyframe& reference = odometry->map.keyframes[k];
-  const Rigid before = reference.cam_from_world;
-  const Rigid relative = compose(frame->cam_from_world, inverse(before));
-  if (!adjust_segment(odometry, spread->segment, spread->first_id, 1)) spread->num_steps = 0;
-  frame->cam_from_world = compose(relative, reference.cam_from_world);
-  // The beginning of the way that is compared with the velocities moves with it, too.
-  double from[3];
-  transform(before, odometry->travel.from, from);
-  transform(inverse(reference.cam_from_world), from, odometry->travel.from);
-}
-
 namespace {
 
 // A keyframe as a frame. Descriptors are those of its points; keypoints that see none have zeros,
@@ -381,7 +358,7 @@ int32_t join_segments(Odometry* odometry, int32_t first) {
       adjust_around(odometry, k, kJoinSteps);
       adjust_segment(odometry, odometry->segment, 0, kSpreadSteps);
       odometry->spread.num_steps = 0;
-      while (is_spreading(*odometry)) spread_loop(odometry, frame);
+      while (is_spreading(*odometry)) step_spread(odometry, frame);
       remove_lone_points(&map);
       ++odometry->num_loops;
       ++num_joined;

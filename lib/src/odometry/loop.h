@@ -40,18 +40,10 @@ bool is_believed(Odometry* odometry, const Frame& frame, double path, int32_t nu
 // known, and `again`, with the frame's keypoints, has the old points that they see.
 bool find_loop(Odometry* odometry, const Frame& frame, int32_t count, Frame* again, LoopEnd* end);
 
-// Corrects the keyframes and points, roughly: the rest is spread_loop's. `keyframe` has the
-// keypoints of `again`; it is the newest one where it is of the same segment as the loop's end.
-// Returns whether the path jumps.
+// Corrects the keyframes and points, roughly: the rest is left to the frames that follow
+// (odometry/spread.h). `keyframe` has the keypoints of `again`; it is the newest one where it is of
+// the same segment as the loop's end. Returns whether the path jumps.
 bool close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const LoopEnd& end);
-
-// Whether a closed loop is still to be spread over the keyframes of its segment.
-bool is_spreading(const Odometry& odometry);
-
-// One more step of the adjustment after a loop: first of the newest keyframes together (at least a
-// hundred), then of the points alone. `frame`, whose pose is relative to the reference keyframe,
-// moves with it.
-void spread_loop(Odometry* odometry, Frame* frame);
 
 // Looks for the segments of the keyframes from number `first` on in the keyframes before it. Those
 // that meet them become part of theirs. Returns how many.

@@ -463,9 +463,8 @@ tv_status read_map(const uint8_t* bytes, size_t num_bytes, bool replaces, Odomet
     odometry->scale = scale_of({h.evidence, h.product, h.square}, h.scale_source, h.scale_sigma);
   }
   if (map->num_keyframes > 0) {
-    odometry->status = TV_ODOMETRY_LOST;
+    odometry->tracking = {TrackingState::kLost, 1};
     odometry->frame.has_pose = odometry->has_motion = false;
-    odometry->lost_frames = 1;
     odometry->next_search = map->num_keyframes - 1;
     odometry->confirmed_id = map->keyframes[odometry->next_search].id;
     odometry->confirmed = Reach{};

@@ -11,18 +11,18 @@ void start_anew(tv_odometry* o) {
   o->num_starts = o->num_local_points = 0;
   std::fill_n(o->still_cells, o->still_columns * o->still_rows, StillCell{});
   o->still_until = 0;
-  o->unadjusted_id = o->reference_id = o->confirmed_id = -1;
+  o->reference_id = o->confirmed_id = -1;
   o->doubts = 0;
   o->doubtful_segment = -1;
   o->weak_loop.frame = -1;
   o->spread = {0, o->map.sizes.max_points, 0, 0, 0};
-  o->took_step = false;
+  o->unfinished = {-1, 0, false};
+  o->done = Work::kNone;
   o->check = MapCheck{};
   o->has_motion = false;
   o->num_frames = o->segment = o->num_segments = o->other_segment = 0;
-  o->num_relocations = o->num_loops = o->lost_frames = o->turned_frames = o->next_search =
-      o->next_loop = 0;
-  o->status = TV_ODOMETRY_STARTING;
+  o->num_relocations = o->num_loops = o->next_search = o->next_loop = 0;
+  o->tracking = {TrackingState::kStarting, 0};
   o->frame.has_pose = o->previous.has_pose = false;
   o->frame.num = o->previous.num = 0;
   o->median_depth = 1;

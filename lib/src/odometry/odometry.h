@@ -5,6 +5,7 @@
 #include "geometry/camera.h"
 #include "kernels/kernels.h"
 #include "odometry/map.h"
+#include "odometry/tracking_state.h"
 #include "twoview/odometry.h"
 
 namespace tv {
@@ -49,6 +50,20 @@ struct MapCheck {
   int32_t num_others, next;
   int32_t num_unconfirmed;  // keyframes in a row before this one that no pair confirmed
   MapVote vote;
+};
+
+// The newest keyframe until its surroundings are adjusted.
+struct UnfinishedKeyframe {
+  int32_t id;              // -1: it is adjusted
+  int32_t next_neighbour;  // the first one with which no points were made yet
+  bool closed_loop;
+};
+
+// A piece of work that waits until a frame has time for it, the first ones first.
+enum class Work : int32_t {
+  kNone,
+  kFinishKeyframe,  // the newest one's other points, and the adjustment around it
+  kStepSpread,  // a part of what a loop, or a correction of the camera, left (odometry/spread.h)
 };
 
 // A frame that seems to close a loop, but with few points: where it is, and where the loop's end
@@ -161,18 +176,17 @@ struct tv_odometry {
   int32_t segment;
   // These follow each other in a map's bytes, too.
   int32_t num_frames, num_segments, num_relocations, num_loops;
-  int32_t status;
-  int32_t lost_frames, turned_frames, next_search, next_loop;
+  tv::Tracking tracking;
+  int32_t next_search;  // the number of the keyframe from which a lost frame is looked for next
+  int32_t next_loop;    // one more than that of the keyframe in which a loop is looked for next
   int32_t keyframe_inliers;  // how many points the last keyframe saw when it was adjusted
-  int32_t unadjusted_id;     // of the newest keyframe until it is adjusted, else -1
-  bool closed_loop;          // whether that keyframe closed a loop
   bool was_moved_far;        // its adjustment was a jump, since the last tracked frame
-  int32_t next_neighbour;    // its first neighbour with which no points were made yet
   bool is_found_again;       // a lost frame was, and no loop has closed since
   tv::WeakLoop weak_loop;
+  tv::UnfinishedKeyframe unfinished;
   tv::Spread spread;
-  bool took_step;  // a step of `spread` was taken before this frame was tracked
   tv::MapCheck check;
+  tv::Work done;  // before this frame was tracked
   // The last keyframe that its own matches with earlier ones confirmed. Doubts: the tv_map_reason
   // of the frames of a segment since some saw one plane only, or contradicted the map, or since it
   // began.
