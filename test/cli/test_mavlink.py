@@ -49,6 +49,10 @@ def has_mavlink():
     return False
 
 
+def has_room():
+    return "--room" in run("odometry", "--help").stdout
+
+
 NEEDS_ODOMETRY = unittest.skipUnless("\n  odometry " in run("--help").stdout,
                                      "the program was built without TWOVIEW_ODOMETRY")
 
@@ -255,9 +259,15 @@ class Mavlink(unittest.TestCase):
         output = self.folder / "live"
         with world.Vehicle(mavlink, self.port, autopilot="ardupilot"):
             result = run("odometry", "--mavlink", self.address, "--camera-source", self.film,
-                         "--camera", self.camera, "-o", output)
+                         "--camera", self.camera, "-o", output, *["--room"] * has_room())
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assert_flown(output)
+        if has_room():  # of pictures that were kept: the vehicle does not give them again
+            room = json.loads((output / "result.json").read_text())["room"]
+            self.assertGreater(room["keyframes_used"], 0, room)
+            self.assertGreater(room["num_vertices"], 1000, room)
+            self.assertTrue(list((output / "colmap" / "images").iterdir()))
+            self.assertEqual([p for p in output.iterdir() if p.name[0] == "."], [])
 
     def told(self, output, *options):
         """What the vehicle hears of an odometry: {type: messages}."""

@@ -258,7 +258,7 @@ std::vector<std::string> ColmapFolder::add_pictures(const FlightResult& result, 
           std::to_string(ids.size()) + " keyframes: " +
           (!problem.empty() ? problem
            : stop           ? "interrupted"
-                            : "the source ended sooner")};
+                            : source.kind() + " does not give them again")};
 }
 
 void ColmapFolder::add_files(const FlightResult& result) {

@@ -233,7 +233,7 @@ FilmLens estimate_film_lens(FrameSource& source, const FlightOptions& options,
         options.max_frames == 0 ? kMostFrames : std::min(options.max_frames, kMostFrames);
     scouting.keeps_pictures = false;
     Flight flight(source, scouting);
-    flight.track(stop, [&] {
+    flight.track(stop, [&](const SourceFrame&) {
       progress(what + "map " + std::to_string(round + 1) + ", " +
                std::to_string(flight.frames().size()) + " frames");
     });

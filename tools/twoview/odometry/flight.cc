@@ -162,13 +162,14 @@ void Flight::start(const SourceFrame& first) {
   check(status, "cannot start the odometry");
 }
 
-void Flight::track(const std::atomic<bool>& stop, const std::function<void()>& after_frame) {
+void Flight::track(const std::atomic<bool>& stop,
+                   const std::function<void(const SourceFrame&)>& after_frame) {
   const auto wanted = [this](int index) { return wants(index); };
   const auto consume = [&](const SourceFrame& frame) {
     const size_t num_given = given_.size();
     track_frame(frame);
     if (source_.wants_found() && given_.size() > num_given) tell_source();
-    if (after_frame) after_frame();
+    if (after_frame) after_frame(frame);
     picture_.release();
     colour_.release();
     const int next = frame.index / options_.every + 1;

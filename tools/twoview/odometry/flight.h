@@ -73,9 +73,10 @@ class Flight {
   Flight(const Flight&) = delete;
   Flight& operator=(const Flight&) = delete;
 
-  // Tracks the source's frames until its end or until `stop` is set; `after_frame` may be empty.
-  // Throws BadInput where the first frame cannot be used.
-  void track(const std::atomic<bool>& stop, const std::function<void()>& after_frame);
+  // Tracks the source's frames until its end or until `stop` is set. after_frame gets each of them
+  // as the source gave it, and may be empty. Throws BadInput where the first frame cannot be used.
+  void track(const std::atomic<bool>& stop,
+             const std::function<void(const SourceFrame&)>& after_frame);
   // Fills the frames' final poses: of tracked frames from the map, of the others, where the source
   // can be read again, by looking for them in the map.
   void finish(const std::atomic<bool>& stop);

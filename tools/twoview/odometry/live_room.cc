@@ -13,9 +13,6 @@ namespace {
 // Pictures are kept at this longer side at most, and so many of them: 25 MB of colour.
 constexpr int kLongerSide = 640;
 constexpr size_t kMostKept = 48;
-// A frame is kept where it is so far from the one before, as a share of the median depth: what is
-// nearer is no partner of it.
-constexpr double kStep = 0.02, kCosine = 0.9993908270190958;  // of 2 degrees
 // A keyframe waits for so many frames after it: in steps of 0.02 they are a fifth of the median
 // depth away, where its farthest partners are.
 constexpr size_t kAfter = 10;
@@ -44,13 +41,6 @@ std::optional<Pose> pose_in(const Flight& flight, int32_t reference_id,
 
 double distance_between(const Pose& a, const Pose& b) {
   return norm({a.t[0] - b.t[0], a.t[1] - b.t[1], a.t[2] - b.t[2]});
-}
-
-bool is_elsewhere(const RoomView& last, const RoomView& view, double median_depth) {
-  const Vector3 step{view.t[0] - last.t[0], view.t[1] - last.t[1], view.t[2] - last.t[2]};
-  double trace = 0;
-  for (size_t k = 0; k < 9; ++k) trace += last.R[k] * view.R[k];
-  return norm(step) >= kStep * median_depth || (trace - 1) / 2 < kCosine;
 }
 
 }  // namespace

@@ -29,6 +29,7 @@
 #include "pair/session.h"
 #include "verbs/common.h"
 #ifdef TWOVIEW_HAS_ROOM
+#include "odometry/kept_pictures.h"
 #include "odometry/room_options.h"
 #include "room_model/page.h"
 #include "room_model/preview.h"
@@ -262,9 +263,9 @@ struct FlightRoom {
 };
 
 #ifdef TWOVIEW_HAS_ROOM
-// What goes wrong with the room is noted, and the flight's results are written all the same. live:
-// the page that shows it, or null.
-FlightRoom room_of(Arguments& a, FrameSource& source, FlightResult& result,
+// What goes wrong with the room is noted, and the flight's results are written all the same. kept:
+// the pictures of a live source, or null. live: the page that shows the room, or null.
+FlightRoom room_of(Arguments& a, FrameSource& source, KeptPictures* kept, FlightResult& result,
                    const TrueRoom& true_room, const std::atomic<bool>& stop, LivePage* live) {
   FlightRoom room;
   result.json["room"] = nullptr;
@@ -276,11 +277,14 @@ FlightRoom room_of(Arguments& a, FrameSource& source, FlightResult& result,
     a.common.note("no room: no frame has a pose");
     return room;
   }
+  if (kept != nullptr)
+    for (RoomView& view : room.scene.views) view.has_picture = kept->has(view.index);
   try {
     RoomBuilder builder(room.scene, a.room);
     const Flight& flight = *result.flight;
-    read_pictures_with_progress(source, flight.masks(), flight.still_mask(), builder, stop,
-                                !a.common.quiet, [live](const std::string& words) {
+    read_pictures_with_progress(kept != nullptr ? *kept : source, flight.masks(),
+                                flight.still_mask(), builder, stop, !a.common.quiet,
+                                [live](const std::string& words) {
                                   if (live != nullptr) live->tell(words);
                                 });
     if (live != nullptr) live->tell("room: the surface");
@@ -549,12 +553,6 @@ int odometry(Arguments& a) {
         "--scale-camera is for --camera: for a camera that the source has itself, give its file "
         "there, such as the folder's cameras.yaml");
   const std::unique_ptr<FrameSource> source = open_source(a);
-#ifdef TWOVIEW_HAS_ROOM
-  if (a.makes_room && !source->can_run_again())
-    throw BadInput(
-        "--room reads the pictures a second time, which a live source does not allow: record them "
-        "first");
-#endif
   const std::string truth_file = a.truth.empty() ? source->truth_file() : a.truth;
 #ifdef TWOVIEW_HAS_ROOM
   const TrueRoom true_room(a.room_truth);
@@ -581,6 +579,10 @@ int odometry(Arguments& a) {
   FlightOptions options = a.flight;
   const std::optional<FilmLens> lens = lens_of_film(a, *source, stop, &options);
   Flight flight(*source, options);
+#ifdef TWOVIEW_HAS_ROOM
+  std::optional<KeptPictures> kept;
+  if (a.makes_room && !source->can_run_again()) kept.emplace(files.folder(), source->kind());
+#endif
   std::optional<LivePage> live;
   if (a.is_live || a.live_port > 0) {
 #ifdef TWOVIEW_HAS_ROOM
@@ -596,10 +598,15 @@ int odometry(Arguments& a) {
   }
   {
     FlightProgress progress(flight, wanted, !common.quiet);
-    flight.track(stop, [&] {
+    flight.track(stop, [&](const SourceFrame& frame) {
       advise_on_size(a, flight.file_camera());
       progress.show();
       if (live) live->update(flight);
+#ifdef TWOVIEW_HAS_ROOM
+      if (kept) kept->keep(frame, flight);
+#else
+      (void)frame;
+#endif
     });
   }
   if (flight.frames().empty()) throw BadInput("no frame came from " + source->kind());
@@ -634,7 +641,10 @@ int odometry(Arguments& a) {
   if (!flight.still_mask().empty()) common.note(still_note(result));
   bool was_stopped = stop;
 #ifdef TWOVIEW_HAS_ROOM
-  const FlightRoom room = room_of(a, *source, result, true_room, stop, live ? &*live : nullptr);
+  const FlightRoom room = room_of(a, *source, kept ? &*kept : nullptr, result, true_room, stop,
+                                  live ? &*live : nullptr);
+  if (kept)
+    for (const std::string& note : kept->notes()) common.note(note);
   std::optional<DepthFolder> depth;
   if (room.model) depth.emplace(files.folder(), *room.model);
 #else
@@ -642,12 +652,17 @@ int odometry(Arguments& a) {
 #endif
   was_stopped = was_stopped || stop;
   const bool has_map = !result.keyframes.empty();
+  FrameSource& pictures =
+#ifdef TWOVIEW_HAS_ROOM
+      kept ? static_cast<FrameSource&>(*kept) :
+#endif
+           *source;
   ColmapFolder colmap(files.folder() / "colmap", {camera_path(a.camera), truth_file}, has_map);
   if (has_map) colmap.add_model(result);
   if (has_map) note_blanks(result, common);
   if (has_map && !a.leaves_pictures) {
     const Stopwatch watch(!common.quiet, "writing the pictures of the keyframes");
-    for (const std::string& note : colmap.add_pictures(result, *source, stop)) common.note(note);
+    for (const std::string& note : colmap.add_pictures(result, pictures, stop)) common.note(note);
   }
   result.json["colmap_pictures"] = colmap.pictures_json();
   result.json["focal_length"] = lens ? lens->json() : nlohmann::ordered_json(nullptr);
@@ -725,7 +740,9 @@ void add_odometry(CLI::App& program, Run& run) {
   add_kernels(*verb, o.kernels);
 #ifdef TWOVIEW_HAS_ROOM
   CLI::Option* room = verb->add_flag("--room", a->makes_room,
-                                     "make the surface of the room as well, as twoview room does");
+                                     "make the surface of the room as well, as twoview room does; "
+                                     "of a live source, whose pictures are kept on the disk of the "
+                                     "results for it, too");
   for (CLI::Option* option : add_room_options(*verb, a->room, a->room_truth)) option->needs(room);
 #endif
 #ifdef TWOVIEW_HAS_DRONE

@@ -22,6 +22,7 @@ constexpr size_t kNeighbours = 120;
 constexpr double kLeastCosine =
     0.939372712847379;                // of 0.35 rad, the most that a partner is turned
 constexpr double kLeastShare = 0.02;  // of the median depth, the least distance
+constexpr double kElsewhereCosine = 0.9993908270190958;  // of 2 degrees
 
 // The cosine of the angle by which one rotation differs from another.
 double cosine_between(const Matrix3& a, const Matrix3& b) {
@@ -49,7 +50,7 @@ std::vector<Candidate> candidates(const RoomScene& scene, size_t key, double med
   const size_t end = std::min(scene.views.size(), key + reach + 1);
   std::vector<Candidate> found;
   for (size_t k = first; k < end; ++k) {
-    if (k == key) continue;
+    if (k == key || !scene.views[k].has_picture) continue;
     const RoomView& other = scene.views[k];
     Vector3 away;
     for (size_t axis = 0; axis < 3; ++axis) away[axis] = other.t[axis] - own.t[axis];
@@ -85,6 +86,12 @@ DepthRange depth_range(const RoomScene& scene, const RoomView& view) {
   return {kNearShare * at(0.01), at(0.5), kFarShare * at(0.99)};
 }
 
+bool is_elsewhere(const RoomView& last, const RoomView& view, double median_depth) {
+  const Vector3 step{view.t[0] - last.t[0], view.t[1] - last.t[1], view.t[2] - last.t[2]};
+  return norm(step) >= kLeastShare * median_depth ||
+         cosine_between(view.R, last.R) < kElsewhereCosine;
+}
+
 bool is_new_beside(const RoomView& last, const RoomView& view, double median_depth) {
   Vector3 step;
   for (size_t axis = 0; axis < 3; ++axis) step[axis] = view.t[axis] - last.t[axis];
@@ -95,7 +102,7 @@ std::vector<size_t> choose_keyframes(const RoomScene& scene, double median_depth
   std::vector<size_t> chosen;
   for (size_t k = 0; k < scene.views.size(); ++k) {
     const RoomView& view = scene.views[k];
-    if (!view.is_keyframe) continue;
+    if (!view.is_keyframe || !view.has_picture) continue;
     if (!chosen.empty() && scene.is_flight &&
         !is_new_beside(scene.views[chosen.back()], view, median_depth))
       continue;

@@ -16,6 +16,11 @@ struct DepthRange {
 // By the scene's points that the view shows; not known with fewer than twenty of them.
 DepthRange depth_range(const RoomScene& scene, const RoomView& view);
 
+// Whether a view may be a partner of views near another one, which may then be one beside it: by a
+// step of 2 % of the median depth, what is nearer being no partner, or a turn of 2 degrees.
+// median_depth 0: not known, which every view passes.
+bool is_elsewhere(const RoomView& last, const RoomView& view, double median_depth);
+
 // Whether a view sees something new beside another one: by a step of an eighth of the median depth
 // or a turn of 12 degrees.
 bool is_new_beside(const RoomView& last, const RoomView& view, double median_depth);

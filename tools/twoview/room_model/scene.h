@@ -23,6 +23,7 @@ struct RoomView {
   Vector3 t{0, 0, 0};
   bool is_keyframe = false;  // gets a depth map
   double time_s = 0;         // of the frame, where the source has times
+  bool has_picture = true;   // false: of a live source, and not kept
 };
 
 // The frames of one segment, in the order in which their pictures come, and points that they see.

@@ -144,7 +144,7 @@ def main(argv=None):
           f"(within {100 * WITHIN:g} cm; ms a keyframe, of CPU; mesh in all)")
     rows = []
     for seed in range(arguments.first, arguments.first + arguments.flights):
-        folder = flights.render(seed, os.path.join(FLIGHT_FOLDER, f"{seed:02d}"))
+        folder = flights.render(seed, os.path.join(FLIGHT_FOLDER, f"flight_{seed:02d}"))
         with tempfile.TemporaryDirectory() as out:
             run = subprocess.run([PROGRAM, "odometry", folder, "-o", out, "--quiet"], check=False)
             if run.returncode != 0:
