@@ -23,6 +23,7 @@
 #include "files/pairs_file.h"
 #include "odometry/flight.h"
 #include "odometry/outputs.h"
+#include "odometry/path_order.h"
 #include "odometry/reach.h"
 #include "odometry/repeated_pictures.h"
 #include "odometry/truth_doubts.h"
@@ -1053,6 +1054,46 @@ void test_a_picture_that_stands_is_told_from_a_camera_that_does() {
   check_repeated({9, 9, 9, 9, 9, 11, 14, 20}, 0, 0);               // before the start
 }
 
+// 40 frames along an arc, in the order that `taken` gives; one lies in another segment.
+std::string order_words_of(const std::vector<int>& taken) {
+  std::vector<FlightFrame> frames(taken.size());
+  for (size_t n = 0; n < taken.size(); ++n) {
+    const double at = 0.05 * taken[n];
+    frames[n].name = std::to_string(taken[n]) + ".png";
+    frames[n].time_s = 0.1 * static_cast<double>(n);
+    frames[n].status = TV_ODOMETRY_TRACKING;
+    frames[n].origin = PoseOrigin::kTracked;
+    frames[n].segment = n == 5 ? 1 : 0;
+    frames[n].pose = {rotation_of_quaternion(0, std::sin(0.1 * at), 0, std::cos(0.1 * at)),
+                      {std::sin(at), 0, std::cos(at)}};
+    if (n == 5) frames[n].pose.t = {9, 9, 9};
+  }
+  std::vector<tv_map_point> points(9);
+  for (size_t n = 0; n < points.size(); ++n) {
+    points[n].segment = 0;
+    points[n].position[0] = 3 + 0.1 * static_cast<double>(n);
+  }
+  return path_order_words(frames, points, 0);
+}
+
+void test_the_path_tells_pictures_that_are_in_another_order(void) {
+  std::vector<int> right, pairs, shuffled, cut, there_and_back, halves;
+  for (int n = 0; n < 40; ++n) {
+    right.push_back(n);
+    pairs.push_back(n ^ 1);
+    shuffled.push_back(17 * n % 40);
+    cut.push_back(n < 20 ? n : n + 15);
+    there_and_back.push_back(n < 20 ? n : 40 - n);
+    halves.push_back((n + 25) % 40);
+  }
+  TEST_ASSERT_EQUAL_STRING("", order_words_of(right).c_str());
+  TEST_ASSERT_EQUAL_STRING("", order_words_of(there_and_back).c_str());
+  for (const std::vector<int>& taken : {pairs, shuffled})
+    TEST_ASSERT_NOT_NULL(std::strstr(order_words_of(taken).c_str(), "goes to and fro"));
+  TEST_ASSERT_NOT_NULL(std::strstr(order_words_of(cut).c_str(), "from 19.png to 35.png"));
+  TEST_ASSERT_NOT_NULL(std::strstr(order_words_of(halves).c_str(), "from 39.png to 0.png"));
+}
+
 }  // namespace
 
 int main() {
@@ -1101,5 +1142,6 @@ int main() {
   RUN_TEST(test_segments_are_counted_that_have_keyframes);
   RUN_TEST(test_the_font_gets_letters_that_it_has);
   RUN_TEST(test_a_frame_found_afterwards_is_where_the_camera_can_have_flown);
+  RUN_TEST(test_the_path_tells_pictures_that_are_in_another_order);
   return UNITY_END();
 }

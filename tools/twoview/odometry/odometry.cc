@@ -22,6 +22,7 @@
 #include "odometry/flight.h"
 #include "odometry/live.h"
 #include "odometry/outputs.h"
+#include "odometry/path_order.h"
 #include "odometry/report.h"
 #include "odometry/stored_source.h"
 #include "pair/options.h"
@@ -634,6 +635,9 @@ int odometry(Arguments& a) {
   const std::optional<FilmFacts> film = source->film();
   FlightResult result = result_of(flight, truth, film ? film->clock_start_s : 0,
                                   wanted < 0 ? static_cast<int>(flight.frames().size()) : wanted);
+  if (const std::string note = path_order_words(flight.frames(), result.points, result.segment);
+      !note.empty())
+    common.note(note);
   for (const std::string& note : result.truth_notes) common.note(note);
   const std::string mask_note =
       white_mask_note(flight.masks(), flight.masked_share(), "all frames");
