@@ -81,7 +81,7 @@ class Folders(CliTest):
         self.assertEqual(self.names(), [f"frame{i}.png" for i in range(1, COUNT + 1)])
         self.assertLess(result["truth"]["ate_rmse_percent_of_path"], 1)
         self.assertEqual(result["notes"], [
-            f"7 pictures of frames are left out: Kopie von frame7.png {COPY} (so are 6 more)"])
+            f"7 pictures of frames are left out: frame4 (1).png {COPY} (so are 6 more)"])
 
     def test_a_series_is_none_of_copies_though_it_stands_still(self):
         """The names that a browser or Windows gives; the third picture is the second again."""

@@ -15,11 +15,12 @@ _FIRST = {b"/": 0, b".": 1}
 
 def natural_key(name):
     """The key that sorts names so that frame2 comes before frame10. Runs of ASCII digits are whole
-    numbers of any length; other bytes compare as they are, with / lowest and the dot next; names
-    that are equal by this, such as a01 and a1, compare by their bytes."""
+    numbers of any length; capitals count as small letters, other bytes compare as they are, with /
+    lowest and the dot next; names that are equal by this, such as a01 and a1, compare by their
+    bytes."""
     data = name.encode("utf-8", "surrogateescape")
     pieces = []
-    for piece in _PIECES.findall(data):
+    for piece in _PIECES.findall(data.lower()):
         if piece[:1].isdigit():
             digits = piece.lstrip(b"0")
             # A number takes the place of the byte "0" against another byte.

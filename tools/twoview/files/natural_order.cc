@@ -21,7 +21,11 @@ std::string_view take_number(std::string_view& text) {
 
 // / first, so that the files of a folder stay together; then the dot, so that a.png, to which a
 // second picture of the name is "a (1).png" or a-1.png, comes before that one.
-int rank(char c) { return c == '/' ? 0 : c == '.' ? 1 : 2 + static_cast<unsigned char>(c); }
+// Capitals count as small letters: IMG_1.JPG, img_2.jpg.
+int rank(char c) {
+  if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return c == '/' ? 0 : c == '.' ? 1 : 2 + static_cast<unsigned char>(c);
+}
 
 // The runs of digits of a name: begin and end of each.
 std::vector<std::pair<size_t, size_t>> runs_of(std::string_view name) {
@@ -120,7 +124,7 @@ bool comes_before(std::string_view a, std::string_view b) {
       if (m != n) return m < n;
       continue;
     }
-    if (x[0] != y[0]) return rank(x[0]) < rank(y[0]);
+    if (rank(x[0]) != rank(y[0])) return rank(x[0]) < rank(y[0]);
     x.remove_prefix(1);
     y.remove_prefix(1);
   }
