@@ -74,12 +74,14 @@ HARMLESS_STARTS = ("board", "square", "marker", "pattern", "checker", "chessboar
 _SUSPECT = re.compile(
     "dist|coef|lens|fish|focal|radial|tangential|skew|binning|roi|sigma|resol|width|height|size|"
     "shape|dimension|intrinsic|principal|scale|crop|zoom|omni|mirror|model|matrix|rectif|prism|"
-    "division|project|stretch|optic|pixel|cameratype|cameramat")
+    "division|project|stretch|optic|pixel|cameratype|cameramat|kappa|lambda|barrel|warp|curv")
 _SUSPECT_WHOLE = re.compile(
     "f|fx|fy|cx|cy|fu|fv|cu|cv|u0|v0|mu|mv|ppx|ppy|flx|fly|w|h|k|d|p|r|s|a|b|c|e|m|xi|alpha|beta|"
-    "gamma|[kpsbdmar][0-9]+|ks|ps|tau[xy]?|tx|ty|poly[0-9]*|invpol.*|[hvd]?fov|cols|rows|mtx|type")
+    "gamma|[kpsbdmarqt][0-9]+|ks|ps|tau[xy]?|tx|ty|poly[0-9]*|invpol.*|[hvd]?fov|cols|rows|mtx|"
+    "type")
 # Of these a value of 0 says that there is none.
-_ZERO_IS_NONE = re.compile("[kpsb][0-9]+|[abc]|skew|tau[xy]?|tx|ty|radial|tangential|xi")
+_ZERO_IS_NONE = re.compile("[kpsbqt][0-9]+|[abc]|skew|tau[xy]?|tx|ty|radial|tangential|xi|"
+                           "kappa[0-9]*|lambda|barrel")
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE | re.ASCII)
 _NOT_FINITE = re.compile(r"[+-]?\.?(nan|inf|infinity)", re.IGNORECASE)

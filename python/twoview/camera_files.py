@@ -82,7 +82,8 @@ def _value(yaml: Any, node: Any, name: str) -> Any:
 
 
 def parse_yaml(text: str, name: str) -> dict[str, Any]:
-    """The first document of a YAML or JSON text; FormatError if it is no map."""
+    """The document of a YAML or JSON text; FormatError if it is no map, or if several say different
+    things. Messages of ROS as they are printed, one document each, differ in their headers."""
     try:
         yaml: Any = importlib.import_module("yaml")  # needed here only
     except ImportError:
@@ -99,16 +100,21 @@ def parse_yaml(text: str, name: str) -> dict[str, Any]:
             if isinstance(event, yaml.AliasEvent):
                 line = event.start_mark.line + 1
                 raise FormatError(f"{name}: line {line}: aliases are not supported")
-            if isinstance(event, yaml.DocumentEndEvent):
-                break
-        root = next(yaml.compose_all(text, yaml.BaseLoader), None)
+        documents = list(yaml.compose_all(text, yaml.BaseLoader)) or [None]
     except yaml.YAMLError as error:
         raise FormatError(f"{name}: no YAML: {' '.join(str(error).split())}") from None
-    if not isinstance(root, yaml.MappingNode):
+    values = [_value(yaml, node, name) if node else None for node in documents]
+    root = values[0]
+    if not isinstance(root, dict):
         raise FormatError(f"{name}: no YAML map of names and values")
-    values = _value(yaml, root, name)
-    assert isinstance(values, dict)
-    return values
+
+    def says(value: Any) -> Any:
+        return ({entry: item for entry, item in value.items() if entry != "header"}
+                if isinstance(value, dict) else value)
+    if any(value is not None and says(value) != says(root) for value in values[1:]):
+        raise FormatError(f"{name}: {len(values)} documents (---) that say different things: keep "
+                          "one")
+    return root
 
 
 def _xml_value(element: Any, name: str) -> Any:
@@ -327,9 +333,10 @@ def _vins(root: Mapping[str, Any], name: str, read: _Read) -> bool:
 def _nerfstudio(root: Mapping[str, Any], name: str, read: _Read) -> bool:
     """nerfstudio's and instant-ngp's transforms.json: COLMAP's numbers with names of their own."""
     frames = root.get("frames")
-    own = next((key for frame in frames for key in frame if isinstance(frame, dict)
-                and key in ("fl_x", "fl_y", "cx", "cy", "k1", "k2", "p1", "p2", "w", "h")),
-               None) if isinstance(frames, list) else None
+    of_lens = {"fl_x", "fl_y", "cx", "cy", "k1", "k2", "k3", "k4", "p1", "p2", "w", "h",
+               "distortion_params", "camera_model", "is_fisheye"}
+    own = next((key for frame in frames if isinstance(frame, dict) for key in frame
+                if key in of_lens), None) if isinstance(frames, list) else None
     if own:
         raise FormatError(f"{name}: a frame has {own} of its own (one camera for each picture); "
                           + _WRITE_OURS)

@@ -210,22 +210,23 @@ constexpr const char* kHarmlessStarts[] = {
     "extrinsic",  "calibrateusing", "overlapping", "lapping", "imu"};
 // Names that may concern the lens: what they contain, or the whole of them.
 constexpr const char* kSuspect[] = {
-    "dist",     "coef",    "lens",      "fish",      "focal",     "radial",     "tangential",
-    "skew",     "binning", "roi",       "sigma",     "resol",     "width",      "height",
-    "size",     "shape",   "dimension", "intrinsic", "principal", "scale",      "crop",
-    "zoom",     "omni",    "mirror",    "model",     "matrix",    "rectif",     "prism",
-    "division", "project", "stretch",   "optic",     "pixel",     "cameratype", "cameramat"};
+    "dist",      "coef",       "lens",      "fish",  "focal",    "radial",  "tangential", "skew",
+    "binning",   "roi",        "sigma",     "resol", "width",    "height",  "size",       "shape",
+    "dimension", "intrinsic",  "principal", "scale", "crop",     "zoom",    "omni",       "mirror",
+    "model",     "matrix",     "rectif",    "prism", "division", "project", "stretch",    "optic",
+    "pixel",     "cameratype", "cameramat", "kappa", "lambda",   "barrel",  "warp",       "curv"};
 const std::regex& suspect_whole() {
   static const std::regex names(
       "f|fx|fy|cx|cy|fu|fv|cu|cv|u0|v0|mu|mv|ppx|ppy|flx|fly|w|h|k|d|p|r|s|a|b|c|e|m|xi|alpha|"
-      "beta|gamma|[kpsbdmar][0-9]+|ks|ps|tau[xy]?|tx|ty|poly[0-9]*|invpol.*|[hvd]?fov|cols|rows|"
+      "beta|gamma|[kpsbdmarqt][0-9]+|ks|ps|tau[xy]?|tx|ty|poly[0-9]*|invpol.*|[hvd]?fov|cols|rows|"
       "mtx|"
       "type");
   return names;
 }
 // Of these a value of 0 says that there is none.
 const std::regex& zero_is_none() {
-  static const std::regex names("[kpsb][0-9]+|[abc]|skew|tau[xy]?|tx|ty|radial|tangential|xi");
+  static const std::regex names(
+      "[kpsbqt][0-9]+|[abc]|skew|tau[xy]?|tx|ty|radial|tangential|xi|kappa[0-9]*|lambda|barrel");
   return names;
 }
 

@@ -297,7 +297,8 @@ bool read_nerfstudio(CameraFile& file) {
   const YAML::Node& root = file.root;
   if (root["frames"] && root["frames"].IsSequence())
     for (const auto& frame : root["frames"])
-      for (const char* key : {"fl_x", "fl_y", "cx", "cy", "k1", "k2", "p1", "p2", "w", "h"})
+      for (const char* key : {"fl_x", "fl_y", "cx", "cy", "k1", "k2", "k3", "k4", "p1", "p2", "w",
+                              "h", "distortion_params", "camera_model", "is_fisheye"})
         if (frame.IsMap() && frame[key])
           throw BadInput(file.path + ": a frame has " + key +
                          " of its own (one camera for each picture); " + kWriteOurs);

@@ -117,6 +117,24 @@ bool parse_number(std::string text, double& value) {
   return result.ec == std::errc() && result.ptr == end;
 }
 
+namespace {
+
+// Refuses documents behind the first one that say something else than it does. Messages of ROS as
+// they are printed, one document each, differ in their headers.
+void refuse_documents(const std::vector<YAML::Node>& documents, const std::string& file) {
+  const auto text_of = [](const YAML::Node& document) {
+    YAML::Node rest = YAML::Clone(document);
+    if (rest.IsMap()) rest.remove("header");
+    return YAML::Dump(rest);
+  };
+  for (size_t k = 1; k < documents.size(); ++k)
+    if (!documents[k].IsNull() && text_of(documents[k]) != text_of(documents[0]))
+      throw BadInput(file + ": " + std::to_string(documents.size()) +
+                     " documents (---) that say different things: keep one");
+}
+
+}  // namespace
+
 YAML::Node parse_yaml(const std::string& text, const std::string& file) {
   std::string body = text;
   if (body.compare(0, 3, "\xef\xbb\xbf") == 0) body.erase(0, 3);
@@ -131,8 +149,12 @@ YAML::Node parse_yaml(const std::string& text, const std::string& file) {
   try {
     std::istringstream stream(body);
     StrictReader reader;
-    YAML::Parser(stream).HandleNextDocument(reader);
-    root = YAML::Load(body);
+    YAML::Parser parser(stream);
+    while (parser.HandleNextDocument(reader)) {
+    }
+    const std::vector<YAML::Node> documents = YAML::LoadAll(body);
+    if (!documents.empty()) root = documents[0];
+    refuse_documents(documents, file);
   } catch (const YAML::Exception& e) {
     const std::string where =
         e.mark.is_null() ? "" : "line " + std::to_string(e.mark.line + 1) + ": ";
