@@ -134,11 +134,13 @@ int64_t time_of(const AVPacket& packet) {
   return packet.pts != AV_NOPTS_VALUE ? packet.pts : packet.dts;
 }
 
-// Whether the first packet of the stream has a time: those of a raw stream have none.
+// Whether the first packet of the stream has a time: those of a raw stream have none, or (MPEG-2)
+// only times of decoding that libavformat counts itself.
 bool has_times(AVFormatContext& film, const AVStream& pictures) {
+  const bool may_count = (film.iformat->flags & AVFMT_GENERIC_INDEX) != 0;
   bool has_time = false;
   read_packets(film, pictures, [&](const AVPacket& packet) {
-    has_time = time_of(packet) != AV_NOPTS_VALUE;
+    has_time = (may_count ? packet.pts : time_of(packet)) != AV_NOPTS_VALUE;
     return false;
   });
   return has_time;
