@@ -95,7 +95,8 @@ static double time_pair(tv_context *context, const char *name, int size) {
     const double start = now_ms();
     tv_two_view_init(&pose);
     tv_reconstruction_init(&found);
-    if (tv_reconstruct(context, &views[0], &views[1], &options, &pose, &found) != TV_OK) exit(2);
+    if (tv_reconstruct(context, &views[0], &views[1], &options, &pose, NULL, &found) != TV_OK)
+      exit(2);
     if (now_ms() - start < least) least = now_ms() - start;
   }
   printf("%-14s %4d %8.2f ms  %4d %4d keypoints %4d matches\n", name, size, least,

@@ -60,8 +60,9 @@ class Ours {
     options.match = &options_.match;
     tv_two_view_init(&pose_);
     tv_reconstruction_init(&found_);
-    bench::require(tv_reconstruct(context_.get(), &views[0], &views[1], &options, &pose_, &found_),
-                   "tv_reconstruct");
+    bench::require(
+        tv_reconstruct(context_.get(), &views[0], &views[1], &options, &pose_, nullptr, &found_),
+        "tv_reconstruct");
   }
 
   // Reports counts and errors of the result, and runs once more to measure the time of each stage.

@@ -175,7 +175,7 @@ class Ours:
         def work(keep=(cameras, views, stages)):
             del keep
             library.call("tv_reconstruct", self.context._pointer, ctypes.byref(views[0]),
-                         ctypes.byref(views[1]), ctypes.byref(options), ctypes.byref(result),
+                         ctypes.byref(views[1]), ctypes.byref(options), ctypes.byref(result), None,
                          ctypes.byref(found))
             R = np.reshape(result.R, (3, 3)) if result.has_R and result.has_t else None
             return {"keypoints": found.num_keypoints[0], "matches": found.num_matches,

@@ -60,9 +60,9 @@ void add_ours(const std::string& name, const Problems& problems) {
     pairs.num = p.size();
     pairs.pixels0 = p.pixels[0].data();
     pairs.pixels1 = p.pixels[1].data();
-    bench::require(
-        tv_estimate_two_view(context.get(), &p.camera, &p.camera, &pairs, nullptr, &pose, nullptr),
-        "tv_estimate_two_view");
+    bench::require(tv_estimate_two_view(context.get(), &p.camera, &p.camera, &pairs, nullptr, &pose,
+                                        nullptr, nullptr),
+                   "tv_estimate_two_view");
     return pose.has_R && pose.has_t ? bench::pose_error_deg(pose.R, pose.t, p.R, p.t) : 180;
   });
 }

@@ -107,8 +107,8 @@ static void estimate(stages *s) {
   pairs.pixels1 = s->pixels[1];
   pairs.ratios = s->ratios;
   tv_two_view_init(&s->pose);
-  require(tv_estimate_two_view(s->context, &s->camera, &s->camera, &pairs, NULL, &s->pose, NULL) ==
-              TV_OK,
+  require(tv_estimate_two_view(s->context, &s->camera, &s->camera, &pairs, NULL, &s->pose, NULL,
+                               NULL) == TV_OK,
           "tv_estimate_two_view");
 }
 
@@ -123,7 +123,7 @@ static void pair(stages *s) {
   }
   tv_two_view_init(&s->pose);
   tv_reconstruction_init(&cloud);
-  require(tv_reconstruct(s->context, &views[0], &views[1], NULL, &s->pose, &cloud) == TV_OK,
+  require(tv_reconstruct(s->context, &views[0], &views[1], NULL, &s->pose, NULL, &cloud) == TV_OK,
           "tv_reconstruct");
 }
 

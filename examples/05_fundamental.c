@@ -53,7 +53,7 @@ int main(int argc, char **argv) {
   pairs.pixels0 = pixels[0];
   pairs.pixels1 = pixels[1];
   pairs.ratios = ratios;
-  status = tv_estimate_two_view(context, NULL, NULL, &pairs, &options, &found, inlier);
+  status = tv_estimate_two_view(context, NULL, NULL, &pairs, &options, &found, NULL, inlier);
   if (status != TV_OK) return fail(tv_status_string(status));
   printf("%s (%s): %d of %d matches agree after %d samples\n", tv_kind_string(found.kind),
          tv_verdict_string(found.verdict), found.num_inliers, n, found.num_iterations);

@@ -71,7 +71,7 @@ int main(int argc, char **argv) {
   pairs.pixels0 = pixels[0];
   pairs.pixels1 = pixels[1];
   pairs.ratios = ratios;
-  if (tv_estimate_two_view(context, NULL, NULL, &pairs, &options, &found, inlier) != TV_OK ||
+  if (tv_estimate_two_view(context, NULL, NULL, &pairs, &options, &found, NULL, inlier) != TV_OK ||
       !found.has_F)
     return fail("no fundamental matrix");
   for (v = 0; v < 2; ++v) {

@@ -81,7 +81,7 @@ int main(int argc, char **argv) {
   pairs.pixels0 = pixels[0];
   pairs.pixels1 = pixels[1];
   pairs.ratios = ratios;
-  status = tv_estimate_two_view(context, &camera, &camera, &pairs, &options, &pose, NULL);
+  status = tv_estimate_two_view(context, &camera, &camera, &pairs, &options, &pose, NULL, NULL);
   if (status != TV_OK) return fail(tv_status_string(status));
   if (!pose.has_R) return fail("no rotation");
   for (i = 0; i < 9; ++i) /* trace of R_imu^T R; R_imu = world1^T world0 */

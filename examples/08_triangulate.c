@@ -63,7 +63,7 @@ int main(int argc, char **argv) {
   pairs.pixels0 = pixels[0];
   pairs.pixels1 = pixels[1];
   pairs.ratios = ratios;
-  status = tv_estimate_two_view(context, &camera[0], &camera[1], &pairs, NULL, &pose, inlier);
+  status = tv_estimate_two_view(context, &camera[0], &camera[1], &pairs, NULL, &pose, NULL, inlier);
   if (status != TV_OK) return fail(tv_status_string(status));
   if (!pose.has_R || !pose.has_t) return fail("no full pose");
   /* The pose with the cameras that it refers to: with the estimated shift of cx, cy, if any. */

@@ -60,7 +60,7 @@ int main(int argc, char **argv) {
   if (status != TV_OK) return fail(tv_status_string(status));
   tv_two_view_init(&pose);
   tv_reconstruction_init(&cloud);
-  status = tv_reconstruct(context, &view[0], &view[1], NULL, &pose, &cloud);
+  status = tv_reconstruct(context, &view[0], &view[1], NULL, &pose, NULL, &cloud);
   if (status != TV_OK) return fail(tv_status_string(status));
   printf("%s (%s): %d of %d matches agree, %d points\n", tv_kind_string(pose.kind),
          tv_verdict_string(pose.verdict), pose.num_inliers, pose.num_matches, cloud.num_points);

@@ -62,7 +62,7 @@ int main(void) {
   }
   tv_two_view_init(&pose);
   tv_reconstruction_init(&cloud);
-  status = tv_reconstruct(context, &view[0], &view[1], NULL, &pose, &cloud);
+  status = tv_reconstruct(context, &view[0], &view[1], NULL, &pose, NULL, &cloud);
   if (status != TV_OK) return 2;
   printf("%s (%s): %d of %d matches agree, t = (%.3f, %.3f, %.3f)\n", tv_kind_string(pose.kind),
          tv_verdict_string(pose.verdict), pose.num_inliers, pose.num_matches, pose.t[0], pose.t[1],

@@ -30,12 +30,12 @@ int main(void) {
 #elif defined(PROGRAM_pose)
   static tv_pixel_pairs pairs;
   static tv_two_view pose;
-  if (tv_estimate_two_view(context, NULL, NULL, &pairs, NULL, &pose, NULL) != TV_OK) return 1;
+  if (tv_estimate_two_view(context, NULL, NULL, &pairs, NULL, &pose, NULL, NULL) != TV_OK) return 1;
 #elif defined(PROGRAM_reconstruct)
   static tv_view views[2];
   static tv_two_view pose;
   static tv_reconstruction cloud;
-  if (tv_reconstruct(context, &views[0], &views[1], NULL, &pose, &cloud) != TV_OK) return 1;
+  if (tv_reconstruct(context, &views[0], &views[1], NULL, &pose, NULL, &cloud) != TV_OK) return 1;
 #elif defined(PROGRAM_track)
   static tv_camera camera;
   static tv_odometry_options options;

@@ -105,22 +105,24 @@ class tv_two_view(Structure):
                 ("has_R", c_uint8), ("has_t", c_uint8), ("has_E", c_uint8), ("has_F", c_uint8),
                 ("has_H", c_uint8), ("has_alternative", c_uint8), ("has_covariance", c_uint8),
                 ("has_alternative_covariance", c_uint8), ("num_iterations", c_int32),
+                ("num_still", c_int32),
                 ("R", c_double * 9), ("t", c_double * 3), ("E", c_double * 9), ("F", c_double * 9),
                 ("H", c_double * 9), ("alternative_R", c_double * 9),
                 ("alternative_t", c_double * 3), ("covariance", c_double * 25),
-                ("alternative_covariance", c_double * 25), ("essential_inliers", c_int32),
-                ("fundamental_inliers", c_int32), ("homography_inliers", c_int32),
-                ("rotation_inliers", c_int32), ("coverage", c_double),
-                ("median_parallax_rad", c_double), ("rms_error_px", c_double),
-                ("noise_px", c_double), ("seed", c_uint64),
-                ("principal_point_shift", c_double * 2), ("principal_point_chi2", c_double),
-                ("principal_point_asked_px", c_double * 2),
-                ("principal_point_asked_covariance", c_double * 3),
-                ("probability_wrong", c_double), ("agreement", c_double),
-                ("region_shift_rad", c_double), ("num_places", c_int32), ("num_still", c_int32),
-                ("focal_scale", c_double), ("focal_sigma", c_double),
-                ("camera_chi2", c_double), ("camera_turn_rad", c_double),
-                ("camera_direction_rad", c_double)]
+                ("alternative_covariance", c_double * 25), ("median_parallax_rad", c_double),
+                ("rms_error_px", c_double), ("noise_px", c_double), ("seed", c_uint64),
+                ("principal_point_shift", c_double * 2), ("probability_wrong", c_double),
+                ("focal_scale", c_double), ("focal_sigma", c_double)]
+
+
+class tv_evidence(Structure):
+    _fields_ = [("struct_size", c_uint32), ("num_places", c_int32),
+                ("essential_inliers", c_int32), ("fundamental_inliers", c_int32),
+                ("homography_inliers", c_int32), ("rotation_inliers", c_int32),
+                ("coverage", c_double), ("agreement", c_double), ("region_shift_rad", c_double),
+                ("principal_point_chi2", c_double), ("principal_point_asked_px", c_double * 2),
+                ("principal_point_asked_covariance", c_double * 3), ("camera_chi2", c_double),
+                ("camera_turn_rad", c_double), ("camera_direction_rad", c_double)]
 
 
 class tv_point(Structure):
@@ -369,7 +371,7 @@ class tv_room_infer_options(Structure):
 
 STRUCTS = [tv_limits, tv_image, tv_camera, tv_camera_pair, tv_epipolar, tv_keypoint, tv_features,
            tv_feature_options, tv_correspondence, tv_match_options, tv_guided_options,
-           tv_pixel_pairs, tv_estimate_options, tv_two_view, tv_point, tv_view,
+           tv_pixel_pairs, tv_estimate_options, tv_two_view, tv_evidence, tv_point, tv_view,
            tv_reconstruct_options, tv_reconstruction, tv_bundle_options, tv_bundle_result,
            tv_pixel_points, tv_absolute_pose_options, tv_absolute_pose, tv_window_view,
            tv_observation, tv_pose_prior, tv_gravity_prior, tv_distance_prior, tv_window,

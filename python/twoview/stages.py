@@ -299,9 +299,9 @@ def match_guided(context: Context, camera0: Optional[Camera], camera1: Optional[
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TwoView(Record):
-    """tv_two_view, with the pose cam1_from_cam0: x1 = R x0 + t, |t| = 1. A value that was not
-    estimated is None. print shows the pose and the verdict in a few lines; two results are equal
-    (==) when all their fields are."""
+    """tv_two_view and its tv_evidence, with the pose cam1_from_cam0: x1 = R x0 + t, |t| = 1. A
+    value that was not estimated is None. print shows the pose and the verdict in a few lines; two
+    results are equal (==) when all their fields are."""
 
     kind: Kind  #: the model that explains the matches
     verdict: Verdict  #: whether the result can be relied on
@@ -381,14 +381,24 @@ class TwoView(Record):
         return table(rows)
 
 
+def _result(library: Any) -> Any:
+    """A tv_two_view for a call to fill, with the tv_evidence as an attribute, `evidence`."""
+    found = library.make(_abi.tv_two_view)
+    found.evidence = library.make(_abi.tv_evidence)
+    return found
+
+
 def _two_view(found: Any) -> TwoView:
+    """found: of _result."""
+    evidence = found.evidence
+
     def matrix(field: str, has: int, *shape: int) -> Optional[np.ndarray]:
         return np.array(getattr(found, field)).reshape(shape) if has else None
 
     def inliers(count: int) -> Optional[int]:
         return count if count >= 0 else None
 
-    xx, xy, yy = found.principal_point_asked_covariance
+    xx, xy, yy = evidence.principal_point_asked_covariance
     asked = xx > 0
     covariance = np.array([[xx, xy], [xy, yy]]) if asked else None
     return TwoView(
@@ -400,14 +410,15 @@ def _two_view(found: Any) -> TwoView:
         matrix("alternative_t", found.has_alternative, 3),
         matrix("covariance", found.has_covariance, 5, 5),
         matrix("alternative_covariance", found.has_alternative_covariance, 5, 5),
-        inliers(found.essential_inliers), inliers(found.fundamental_inliers),
-        inliers(found.homography_inliers), inliers(found.rotation_inliers), found.coverage,
+        inliers(evidence.essential_inliers), inliers(evidence.fundamental_inliers),
+        inliers(evidence.homography_inliers), inliers(evidence.rotation_inliers),
+        evidence.coverage,
         found.median_parallax_rad, found.rms_error_px, found.noise_px, found.seed,
-        np.array(found.principal_point_shift), found.principal_point_chi2 if asked else None,
-        matrix("principal_point_asked_px", asked, 2), covariance, found.probability_wrong,
-        found.agreement, found.region_shift_rad, found.num_places, found.num_still,
-        found.focal_scale, found.focal_sigma, found.camera_chi2, found.camera_turn_rad,
-        found.camera_direction_rad)
+        np.array(found.principal_point_shift), evidence.principal_point_chi2 if asked else None,
+        np.array(evidence.principal_point_asked_px) if asked else None, covariance,
+        found.probability_wrong, evidence.agreement, evidence.region_shift_rad,
+        evidence.num_places, found.num_still, found.focal_scale, found.focal_sigma,
+        evidence.camera_chi2, evidence.camera_turn_rad, evidence.camera_direction_rad)
 
 
 def corrected_camera(found: TwoView, camera: Camera) -> Camera:
@@ -436,10 +447,11 @@ def _estimate(context: Context, camera0: Optional[Camera], camera1: Optional[Cam
               **values: Optional[ArrayLike]) -> tuple[Any, np.ndarray]:
     pixels0, pixels1 = _pixels(pixels0, pixels1)
     pairs = _pairs(context.library, pixels0, pixels1, **values)
-    found = context.library.make(_abi.tv_two_view)
+    found = _result(context.library)
     inliers = np.zeros(len(pixels0), np.uint8)
     context.call("tv_estimate_two_view", *_two_cameras(camera0, camera1),
-                 byref(pairs), byref(wanted), byref(found), _abi.pointer(inliers))
+                 byref(pairs), byref(wanted), byref(found), byref(found.evidence),
+                 _abi.pointer(inliers))
     return found, inliers.view(bool)
 
 
@@ -686,11 +698,11 @@ def _reconstruct(context: Context, image0: np.ndarray, camera0: Optional[Camera]
             kept.append(_abi.check_mask("mask" + name, mask, image))
             view.mask = ctypes.addressof(kept[-1])
         views.append(view)
-    found = library.make(_abi.tv_two_view)
+    found = _result(library)
     cloud = library.make(_abi.tv_reconstruction)
     with context.lock:  # the context's next call overwrites the arrays, so copy here
         context.call("tv_reconstruct", byref(views[0]), byref(views[1]), byref(wanted),
-                     byref(found), byref(cloud))
+                     byref(found), byref(found.evidence), byref(cloud))
         del kept  # the call pointed into `kept`, which may be freed only now
         n, m = tuple(cloud.num_keypoints), cloud.num_matches
         first, second = (_copied(cloud.keypoints[v], n[v], _abi.KEYPOINT) for v in range(2))

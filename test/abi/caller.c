@@ -87,6 +87,7 @@ static GUARDED(tv_guided_options) along;
 static GUARDED(tv_pixel_pairs) pairs;
 static GUARDED(tv_estimate_options) estimate;
 static GUARDED(tv_two_view) pose;
+static GUARDED(tv_evidence) evidence;
 static GUARDED(tv_bundle_options) bundle;
 static GUARDED(tv_bundle_result) adjusted;
 static GUARDED(tv_view) views[2];
@@ -126,6 +127,7 @@ static void init_all(void) {
   INIT(tv_pixel_pairs_init, &pairs);
   INIT(tv_estimate_options_init, &estimate);
   INIT(tv_two_view_init, &pose);
+  INIT(tv_evidence_init, &evidence);
   INIT(tv_bundle_options_init, &bundle);
   INIT(tv_bundle_result_init, &adjusted);
   INIT(tv_reconstruct_options_init, &options);
@@ -189,15 +191,20 @@ static int run_stages(tv_context *context, const tv_camera *camera) {
   pairs.it.pixels1 = pixels[1];
   pairs.it.ratios = ratios;
   SPOIL_GROWN(pose.it);
-  CHECK(tv_estimate_two_view(context, camera, camera, &pairs.it, &estimate.it, &pose.it, mask) ==
-        TV_OK);
+  SPOIL_GROWN(evidence.it);
+  CHECK(tv_estimate_two_view(context, camera, camera, &pairs.it, &estimate.it, &pose.it,
+                             &evidence.it, mask) == TV_OK);
   CHECK_GROWN_ZERO(pose.it);
+  CHECK_GROWN_ZERO(evidence.it);
   GUARDS_HOLD(&pose);
+  GUARDS_HOLD(&evidence);
+  CHECK(evidence.it.struct_size == sizeof evidence.it);
+  CHECK(evidence.it.essential_inliers == pose.it.num_inliers);
   CHECK(pose.it.struct_size == sizeof pose.it);
   REFUSES_UNKNOWN(estimate.it, tv_estimate_two_view(context, camera, camera, &pairs.it,
-                                                    &estimate.it, &pose.it, mask));
+                                                    &estimate.it, &pose.it, &evidence.it, mask));
   REFUSES_UNKNOWN(pairs.it, tv_estimate_two_view(context, camera, camera, &pairs.it, &estimate.it,
-                                                 &pose.it, mask));
+                                                 &pose.it, &evidence.it, mask));
   CHECK(tv_corrected_pair(&pose.it, camera, camera, &corrected) == TV_OK);
   REFUSES_UNKNOWN(pose.it, tv_corrected_pair(&pose.it, camera, camera, &corrected));
   epipolar.camera0 = &corrected.camera0;
@@ -228,25 +235,28 @@ static int run_stages(tv_context *context, const tv_camera *camera) {
 
 static int run_reconstruct(tv_context *context) {
   SPOIL_GROWN(pose.it);
+  SPOIL_GROWN(evidence.it);
   SPOIL_GROWN(cloud.it);
   options.it.feature = &feature.it;
   options.it.match = &match.it;
   options.it.estimate = &estimate.it;
   options.it.guided_matching = options.it.bundle_adjustment = 1;
-  CHECK(tv_reconstruct(context, &views[0].it, &views[1].it, &options.it, &pose.it, &cloud.it) ==
-        TV_OK);
+  CHECK(tv_reconstruct(context, &views[0].it, &views[1].it, &options.it, &pose.it, &evidence.it,
+                       &cloud.it) == TV_OK);
   CHECK_GROWN_ZERO(pose.it);
+  CHECK_GROWN_ZERO(evidence.it);
   CHECK_GROWN_ZERO(cloud.it);
   GUARDS_HOLD(&pose);
+  GUARDS_HOLD(&evidence);
   GUARDS_HOLD(&cloud);
   CHECK(cloud.it.struct_size == sizeof cloud.it);
   printf("tv_reconstruct: %d matches, %d points, %s, %a %a %a\n", (int)cloud.it.num_matches,
          (int)cloud.it.num_points, tv_kind_string((tv_kind)pose.it.kind), pose.it.t[0],
          pose.it.t[1], pose.it.t[2]);
   REFUSES_UNKNOWN(options.it, tv_reconstruct(context, &views[0].it, &views[1].it, &options.it,
-                                             &pose.it, &cloud.it));
+                                             &pose.it, &evidence.it, &cloud.it));
   REFUSES_UNKNOWN(views[1].it, tv_reconstruct(context, &views[0].it, &views[1].it, &options.it,
-                                              &pose.it, &cloud.it));
+                                              &pose.it, &evidence.it, &cloud.it));
   return pose.it.t[0] < -0.99 && cloud.it.num_points > 30;
 }
 

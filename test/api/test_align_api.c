@@ -124,8 +124,8 @@ static void test_tv_reconstruct_moves_the_keypoints_alike(void) {
   tv_two_view_init(&two_view);
   tv_reconstruction_init(&reconstruction);
   TEST_ASSERT_EQUAL_INT(TV_OK, align());
-  TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_reconstruct(a.context, &views[0], &views[1], NULL, &two_view, &reconstruction));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_reconstruct(a.context, &views[0], &views[1], NULL, &two_view,
+                                              NULL, &reconstruction));
   TEST_ASSERT_EQUAL_INT(num_matches, reconstruction.num_matches);
   for (v = 0; v < 2; ++v) {
     TEST_ASSERT_EQUAL_INT(num[v], reconstruction.num_keypoints[v]);

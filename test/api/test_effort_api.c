@@ -102,7 +102,7 @@ void tearDown(void) { api_release(&a); }
 static tv_status run_in(tv_context *context, int32_t effort, int32_t max_effort) {
   options.effort = effort;
   options.max_effort = max_effort;
-  return tv_reconstruct(context, &views[0], &views[1], &options, &two_view, &reconstruction);
+  return tv_reconstruct(context, &views[0], &views[1], &options, &two_view, NULL, &reconstruction);
 }
 
 static void run(int32_t effort, int32_t max_effort) {

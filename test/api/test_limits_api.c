@@ -55,7 +55,7 @@ static tv_status run(tv_context *context, int first, const tv_reconstruct_option
                      outcome *o) {
   tv_two_view_init(&o->two_view);
   tv_reconstruction_init(&o->cloud);
-  return tv_reconstruct(context, &views[first], &views[1 - first], options, &o->two_view,
+  return tv_reconstruct(context, &views[first], &views[1 - first], options, &o->two_view, NULL,
                         &o->cloud);
 }
 
@@ -270,7 +270,7 @@ static void run_stages(tv_context *context, const tv_camera *lens, int initialis
   tv_reconstruction_init(&cloud);
   views[0].camera = views[1].camera = lens;
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_reconstruct(context, &views[0], &views[1],
-                                              initialised ? &all : NULL, &r->whole, &cloud));
+                                              initialised ? &all : NULL, &r->whole, NULL, &cloud));
   r->R[0] = r->R[4] = r->R[8] = r->t[0] = 1;
   pair = pair_of(&camera, &camera, r->R, r->t);
   memset(points, 0, sizeof points);

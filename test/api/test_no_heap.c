@@ -128,8 +128,8 @@ static void call_reconstruct(void) {
   }
   tv_two_view_init(&pose);
   tv_reconstruction_init(&cloud);
-  TEST_ASSERT_EQUAL_INT(TV_OK,
-                        tv_reconstruct(context.context, &views[0], &views[1], NULL, &pose, &cloud));
+  TEST_ASSERT_EQUAL_INT(
+      TV_OK, tv_reconstruct(context.context, &views[0], &views[1], NULL, &pose, NULL, &cloud));
 }
 
 static void test_the_counters_see_an_allocation(void) {

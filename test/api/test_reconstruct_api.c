@@ -2,6 +2,7 @@
    where its arrays lie, and determinism. Other tests check how accurate the poses are. */
 
 #include <math.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <unity.h>
 
@@ -67,7 +68,7 @@ void setUp(void) {
 void tearDown(void) { api_release(&a); }
 
 static tv_status run(tv_context *context) {
-  return tv_reconstruct(context, &views[0], &views[1], NULL, &two_view, &reconstruction);
+  return tv_reconstruct(context, &views[0], &views[1], NULL, &two_view, NULL, &reconstruction);
 }
 
 /* Fills the outputs except struct_size with a pattern, which a refused call must leave as it is. */
@@ -76,7 +77,7 @@ static void refused(tv_status expected, const tv_reconstruct_options *options) {
   memset((uint8_t *)&two_view + skip, API_PATTERN, sizeof two_view - skip);
   memset((uint8_t *)&reconstruction + skip, API_PATTERN, sizeof reconstruction - skip);
   TEST_ASSERT_EQUAL_INT(expected, tv_reconstruct(a.context, &views[0], &views[1], options,
-                                                 &two_view, &reconstruction));
+                                                 &two_view, NULL, &reconstruction));
   TEST_ASSERT_TRUE(api_is_pattern((uint8_t *)&two_view + skip, sizeof two_view - skip));
   TEST_ASSERT_TRUE(api_is_pattern((uint8_t *)&reconstruction + skip, sizeof reconstruction - skip));
 }
@@ -103,11 +104,13 @@ static void default_stages(stage_options *o) {
 static void test_null_pointers_are_refused(void) {
   tv_view *v = views;
   tv_reconstruction *r = &reconstruction;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_reconstruct(NULL, v, v + 1, NULL, &two_view, r));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_reconstruct(a.context, NULL, v + 1, NULL, &two_view, r));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_reconstruct(a.context, v, NULL, NULL, &two_view, r));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_reconstruct(a.context, v, v + 1, NULL, NULL, r));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_reconstruct(a.context, v, v + 1, NULL, &two_view, NULL));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_reconstruct(NULL, v, v + 1, NULL, &two_view, NULL, r));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
+                        tv_reconstruct(a.context, NULL, v + 1, NULL, &two_view, NULL, r));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_reconstruct(a.context, v, NULL, NULL, &two_view, NULL, r));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_reconstruct(a.context, v, v + 1, NULL, NULL, NULL, r));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
+                        tv_reconstruct(a.context, v, v + 1, NULL, &two_view, NULL, NULL));
   views[1].image.data = NULL;
   refused(TV_ERR_NULL, NULL);
   tv_reconstruction_init(NULL);
@@ -140,13 +143,21 @@ static void test_structs_of_another_size_are_refused(void) {
 static void test_results_that_overlap_are_refused(void) {
   union {
     tv_two_view two_view;
+    tv_evidence evidence;
     tv_reconstruction reconstruction;
   } both;
   tv_view view0 = view_of(api_image(drawn[0], WIDTH, HEIGHT, WIDTH), &camera, NULL);
   tv_view view1 = view_of(api_image(drawn[1], WIDTH, HEIGHT, WIDTH), &camera, NULL);
   tv_reconstruction_init(&both.reconstruction);
   TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_reconstruct(a.context, &view0, &view1, NULL,
-                                                       &both.two_view, &both.reconstruction));
+                                                       &both.two_view, NULL, &both.reconstruction));
+  tv_reconstruction_init(&both.reconstruction);
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_reconstruct(a.context, &view0, &view1, NULL, &two_view,
+                                                       &both.evidence, &both.reconstruction));
+  tv_two_view_init(&both.two_view);
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
+                        tv_reconstruct(a.context, &view0, &view1, NULL, &both.two_view,
+                                       &both.evidence, &reconstruction));
 }
 
 static void test_what_the_stages_refuse_is_refused(void) {
@@ -384,15 +395,15 @@ static void test_sigmas_by_size_are_those_of_the_stages_by_hand(void) {
   o.feature.keypoint_size = 5;
   o.all.align_matches = 0;
   tv_two_view_init(&without);
-  TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_reconstruct(b.context, &views[0], &views[1], &o.all, &without, &reconstruction));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_reconstruct(b.context, &views[0], &views[1], &o.all, &without,
+                                              NULL, &reconstruction));
   for (adjusted = 0; adjusted < 2; ++adjusted) {
     tv_pixel_pairs pairs;
     tv_two_view by_hand;
     o.all.sigma_by_size = 0.75;
     o.all.bundle_adjustment = adjusted;
-    TEST_ASSERT_EQUAL_INT(
-        TV_OK, tv_reconstruct(b.context, &views[0], &views[1], &o.all, &two_view, &reconstruction));
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_reconstruct(b.context, &views[0], &views[1], &o.all, &two_view,
+                                                NULL, &reconstruction));
     TEST_ASSERT_TRUE(two_view.has_t && two_view.num_inliers > 100);
     n = reconstruction.num_matches;
     for (v = 0; v < 2; ++v) {
@@ -418,7 +429,7 @@ static void test_sigmas_by_size_are_those_of_the_stages_by_hand(void) {
     pairs.sigmas1 = gathered[1];
     tv_two_view_init(&by_hand);
     TEST_ASSERT_EQUAL_INT(TV_OK, tv_estimate_two_view(c.context, &camera, &camera, &pairs,
-                                                      &o.estimate, &by_hand, mask));
+                                                      &o.estimate, &by_hand, NULL, mask));
     if (adjusted) {
       tv_bundle_result result;
       tv_camera_pair corrected;
@@ -475,16 +486,16 @@ static void test_aligned_matches_are_estimated_from_moved_keypoints(void) {
   view_real_pair(&pair);
   tv_reconstruct_options_init(&options);
   options.align_matches = 0;
-  TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_reconstruct(b.context, &views[0], &views[1], &options, &two_view, &reconstruction));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_reconstruct(b.context, &views[0], &views[1], &options, &two_view,
+                                              NULL, &reconstruction));
   n = reconstruction.num_matches;
   for (v = 0; v < 2; ++v) {
     num[v] = reconstruction.num_keypoints[v];
     memcpy(plain[v], reconstruction.keypoints[v], (size_t)num[v] * sizeof plain[v][0]);
   }
   options.align_matches = 1;
-  TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_reconstruct(b.context, &views[0], &views[1], &options, &two_view, &reconstruction));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_reconstruct(b.context, &views[0], &views[1], &options, &two_view,
+                                              NULL, &reconstruction));
   TEST_ASSERT_EQUAL_INT(n, reconstruction.num_matches);
   for (v = 0; v < 2; ++v) {
     memcpy(aligned[v], reconstruction.keypoints[v], (size_t)num[v] * sizeof aligned[v][0]);
@@ -537,12 +548,12 @@ static void test_aligned_matches_are_estimated_from_moved_keypoints(void) {
   pairs.sigmas1 = sigmas[1];
   tv_two_view_init(&by_hand);
   TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_estimate_two_view(c.context, &camera, &camera, &pairs, NULL, &by_hand, mask));
+      TV_OK, tv_estimate_two_view(c.context, &camera, &camera, &pairs, NULL, &by_hand, NULL, mask));
   TEST_ASSERT_EQUAL_MEMORY(mask, reconstruction.inlier_mask, (size_t)n);
   TEST_ASSERT_EQUAL_MEMORY(by_hand.R, two_view.R, sizeof two_view.R);
   TEST_ASSERT_EQUAL_MEMORY(by_hand.t, two_view.t, sizeof two_view.t);
-  TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_reconstruct(b.context, &views[1], &views[0], &options, &two_view, &reconstruction));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_reconstruct(b.context, &views[1], &views[0], &options, &two_view,
+                                              NULL, &reconstruction));
   for (v = 0; v < 2; ++v) {
     TEST_ASSERT_EQUAL_MEMORY(aligned[v], reconstruction.keypoints[1 - v],
                              (size_t)num[v] * sizeof aligned[v][0]);
@@ -583,6 +594,7 @@ static void test_guided_matching_adds_matches_and_keeps_the_verdict(void) {
   static tv_two_view first, guided;
   real_pair pair;
   tv_limits limits;
+  tv_evidence evidence[2];
   tv_reconstruct_options options;
   tv_match_options match;
   api_context b;
@@ -596,29 +608,39 @@ static void test_guided_matching_adds_matches_and_keeps_the_verdict(void) {
   match.neighbourhood_px = 0;
   match.ratio = 0.8f;
   tv_reconstruct_options_init(&options);
+  tv_evidence_init(&evidence[0]);
   options.match = &match;
-  TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_reconstruct(b.context, &views[0], &views[1], &options, &two_view, &reconstruction));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_reconstruct(b.context, &views[0], &views[1], &options, &two_view,
+                                              &evidence[0], &reconstruction));
   first = two_view;
   num_plain = reconstruction.num_matches;
   memcpy(plain, reconstruction.matches, (size_t)num_plain * sizeof plain[0]);
   TEST_ASSERT_EQUAL_INT(1, first.has_t);
   options.guided_matching = 1;
-  TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_reconstruct(b.context, &views[0], &views[1], &options, &two_view, &reconstruction));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_reconstruct(b.context, &views[0], &views[1], &options, &two_view,
+                                              NULL, &reconstruction));
   guided = two_view;
   num_guided = reconstruction.num_matches;
   printf("matches %d, guided %d; inliers %d, guided %d\n", num_plain, num_guided, first.num_inliers,
          guided.num_inliers);
   TEST_ASSERT_TRUE(num_guided > num_plain + num_plain / 50);
+  /* Asked for evidence, the call gives the same result, judged by the evidence of the first one. */
+  tv_two_view_init(&two_view);
+  tv_evidence_init(&evidence[1]);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_reconstruct(b.context, &views[0], &views[1], &options, &two_view,
+                                              &evidence[1], &reconstruction));
+  TEST_ASSERT_EQUAL_MEMORY(&guided, &two_view, sizeof guided);
+  TEST_ASSERT_EQUAL_MEMORY(&evidence[0].agreement, &evidence[1].agreement,
+                           sizeof evidence[0] - offsetof(tv_evidence, agreement));
+  TEST_ASSERT_TRUE(evidence[1].essential_inliers > evidence[0].essential_inliers);
   TEST_ASSERT_TRUE(guided.num_inliers > first.num_inliers);
   TEST_ASSERT_EQUAL_INT(first.kind, guided.kind);
   TEST_ASSERT_EQUAL_INT(first.verdict, guided.verdict);
   TEST_ASSERT_EQUAL_UINT32(first.reasons, guided.reasons);
   for (k = 0; k < num_plain; ++k) TEST_ASSERT_TRUE(place_of(&plain[k]) >= 0);
   check_one_to_one();
-  TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_reconstruct(b.context, &views[1], &views[0], &options, &two_view, &reconstruction));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_reconstruct(b.context, &views[1], &views[0], &options, &two_view,
+                                              NULL, &reconstruction));
   check_one_to_one();
   TEST_ASSERT_EQUAL_INT(num_guided, reconstruction.num_matches);
   for (k = 0; k < 9; ++k) {
@@ -654,14 +676,14 @@ static void test_bundle_adjustment_moves_the_pose_and_what_follows_from_it(void)
   view_real_pair(&pair);
   tv_reconstruct_options_init(&options);
   options.sigma_by_size = 0; /* the adjustment then lowers the sum of squares as it is compared */
-  TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_reconstruct(b.context, &views[0], &views[1], &options, &two_view, &reconstruction));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_reconstruct(b.context, &views[0], &views[1], &options, &two_view,
+                                              NULL, &reconstruction));
   first = two_view;
   memcpy(plain, reconstruction.points, (size_t)reconstruction.num_matches * sizeof plain[0]);
   TEST_ASSERT_EQUAL_INT(1, first.has_t);
   options.bundle_adjustment = 1;
-  TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_reconstruct(b.context, &views[0], &views[1], &options, &two_view, &reconstruction));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_reconstruct(b.context, &views[0], &views[1], &options, &two_view,
+                                              NULL, &reconstruction));
   TEST_ASSERT_EQUAL_INT(first.num_inliers, two_view.num_inliers);
   TEST_ASSERT_TRUE(memcmp(first.R, two_view.R, sizeof first.R) != 0);
   TEST_ASSERT_TRUE(sum_sq(reconstruction.points, plain, first.num_matches) <

@@ -13,6 +13,7 @@ static api_context api;
 static tv_camera camera0, camera1;
 static tv_estimate_options options;
 static tv_two_view result;
+static tv_evidence evidence;
 static double pixels0[2 * MAX_MATCHES], pixels1[2 * MAX_MATCHES];
 static float ratios[MAX_MATCHES];
 static uint8_t mask[MAX_MATCHES];
@@ -225,7 +226,7 @@ static void expect_sound(int count, int cameras_given) {
   if (result.has_F) TEST_ASSERT_DOUBLE_WITHIN(1e-14, 1, norm(result.F, 9));
   if (result.has_H && result.H[8] != 1) TEST_ASSERT_DOUBLE_WITHIN(1e-14, 1, norm(result.H, 9));
   if (result.has_covariance) expect_covariance();
-  TEST_ASSERT_TRUE(result.coverage >= 0 && result.coverage <= 1);
+  TEST_ASSERT_TRUE(evidence.coverage >= 0 && evidence.coverage <= 1);
   TEST_ASSERT_TRUE(result.probability_wrong > 0 && result.probability_wrong <= 1);
   TEST_ASSERT_TRUE((result.has_R && result.has_t) || result.probability_wrong == 1);
   TEST_ASSERT_TRUE(result.median_parallax_rad >= 0 && result.median_parallax_rad <= 3.15);
@@ -236,16 +237,16 @@ static void expect_sound(int count, int cameras_given) {
 
 static void estimate(int count) {
   memset(mask, API_PATTERN, sizeof mask);
-  TEST_ASSERT_EQUAL_INT(TV_OK, estimate_pixels(api.context, &camera0, &camera1, pixels0, pixels1,
-                                               NULL, count, &options, &result, mask));
+  TEST_ASSERT_EQUAL_INT(TV_OK, estimate_evidence(api.context, &camera0, &camera1, pixels0, pixels1,
+                                                 NULL, count, &options, &result, &evidence, mask));
   expect_sound(count, 1);
 }
 
 static void estimate_uncalibrated(int count, int method) {
   options.method = method;
   memset(mask, API_PATTERN, sizeof mask);
-  TEST_ASSERT_EQUAL_INT(TV_OK, estimate_pixels(api.context, NULL, NULL, pixels0, pixels1, NULL,
-                                               count, &options, &result, mask));
+  TEST_ASSERT_EQUAL_INT(TV_OK, estimate_evidence(api.context, NULL, NULL, pixels0, pixels1, NULL,
+                                                 count, &options, &result, &evidence, mask));
   expect_sound(count, 0);
 }
 
@@ -392,11 +393,56 @@ static void test_outputs_may_not_lie_over_a_struct_of_the_call(void) {
   uint8_t *const over[] = {(uint8_t *)&pairs + 4, (uint8_t *)&options + 8, (uint8_t *)&camera0};
   size_t k;
   for (k = 0; k < sizeof over / sizeof over[0]; ++k) {
-    TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_estimate_two_view(api.context, &camera0, &camera1,
-                                                               &pairs, &options, &result, over[k]));
+    TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
+                          tv_estimate_two_view(api.context, &camera0, &camera1, &pairs, &options,
+                                               &result, NULL, over[k]));
   }
   TEST_ASSERT_EQUAL_MEMORY(&pairs_before, &pairs, sizeof pairs);
   TEST_ASSERT_EQUAL_MEMORY(&options_before, &options, sizeof options);
+}
+
+/* The result has the same bytes whether the evidence is asked for or not; the evidence is written
+   as far as the caller's struct reaches, and not at all by a call that is refused. */
+static void test_evidence_is_asked_for_by_a_pointer(void) {
+  const tv_pixel_pairs pairs = pairs_of(pixels0, pixels1, NULL, 300);
+  tv_two_view without;
+  tv_evidence whole, part, before;
+  uint8_t mask_without[300];
+  spoil(240, 300);
+  tv_two_view_init(&without);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_estimate_two_view(api.context, &camera0, &camera1, &pairs,
+                                                    &options, &without, NULL, mask_without));
+  estimate(300);
+  TEST_ASSERT_EQUAL_MEMORY(&without, &result, sizeof result);
+  TEST_ASSERT_EQUAL_MEMORY(mask_without, mask, sizeof mask_without);
+  whole = evidence;
+  TEST_ASSERT_EQUAL_UINT32(sizeof whole, whole.struct_size);
+  TEST_ASSERT_EQUAL_INT(result.num_inliers, whole.essential_inliers);
+  TEST_ASSERT_EQUAL_INT(-1, whole.fundamental_inliers);
+  TEST_ASSERT_TRUE(whole.num_places > 15 && whole.coverage > 0.3 && whole.agreement > 0.5);
+  TEST_ASSERT_TRUE(whole.region_shift_rad > 0 && whole.camera_chi2 > 0);
+  memset(&part, API_PATTERN, sizeof part);
+  before = part;
+  part.struct_size = before.struct_size = offsetof(tv_evidence, coverage);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_estimate_two_view(api.context, &camera0, &camera1, &pairs,
+                                                    &options, &result, &part, NULL));
+  TEST_ASSERT_EQUAL_UINT32(before.struct_size, part.struct_size);
+  TEST_ASSERT_EQUAL_INT(whole.num_places, part.num_places);
+  TEST_ASSERT_EQUAL_INT(whole.rotation_inliers, part.rotation_inliers);
+  TEST_ASSERT_EQUAL_MEMORY(&before.coverage, &part.coverage,
+                           sizeof part - offsetof(tv_evidence, coverage));
+  before.struct_size = 3;
+  part = before;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_STRUCT_SIZE,
+                        tv_estimate_two_view(api.context, &camera0, &camera1, &pairs, &options,
+                                             &result, &part, NULL));
+  TEST_ASSERT_EQUAL_MEMORY(&before, &part, sizeof part);
+  without = result;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
+                        tv_estimate_two_view(api.context, &camera0, &camera1, &pairs, &options,
+                                             &result, (tv_evidence *)&result, NULL));
+  TEST_ASSERT_EQUAL_MEMORY(&without, &result, sizeof result);
+  tv_evidence_init(NULL);
 }
 
 /* Sigmas: [0.01, 1000] and finite, in each of the two arrays and at any place. */
@@ -417,9 +463,9 @@ static void test_sigmas_out_of_range_are_refused(void) {
     for (place = 0; place < 100; place += 99) {
       for (k = 0; k < (int)(sizeof bad / sizeof bad[0]); ++k) {
         sigmas[v][place] = bad[k];
-        TEST_ASSERT_EQUAL_INT(
-            isfinite(bad[k]) ? TV_ERR_ARGUMENT : TV_ERR_NOT_FINITE,
-            tv_estimate_two_view(api.context, &camera0, &camera1, &pairs, &options, &result, mask));
+        TEST_ASSERT_EQUAL_INT(isfinite(bad[k]) ? TV_ERR_ARGUMENT : TV_ERR_NOT_FINITE,
+                              tv_estimate_two_view(api.context, &camera0, &camera1, &pairs,
+                                                   &options, &result, NULL, mask));
         TEST_ASSERT_EACH_EQUAL_UINT8(API_PATTERN, mask, 100);
         TEST_ASSERT_EQUAL_MEMORY(&before, &result, sizeof before);
       }
@@ -428,24 +474,24 @@ static void test_sigmas_out_of_range_are_refused(void) {
         tv_two_view_init(&found);
         sigmas[v][place] = good[k];
         TEST_ASSERT_EQUAL_INT(TV_OK, tv_estimate_two_view(api.context, &camera0, &camera1, &pairs,
-                                                          &options, &found, NULL));
+                                                          &options, &found, NULL, NULL));
         TEST_ASSERT_EQUAL_INT(TV_KIND_CALIBRATED, found.kind);
       }
     }
     sigmas[v][100] = NAN; /* behind the last match: not read */
     TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
                           tv_estimate_two_view(api.context, &camera0, &camera1, &pairs, &options,
-                                               &result, (uint8_t *)&sigmas[v][99]));
+                                               &result, NULL, (uint8_t *)&sigmas[v][99]));
     pairs.num = 0;
     TEST_ASSERT_EQUAL_INT(TV_OK, tv_estimate_two_view(api.context, &camera0, &camera1, &pairs,
-                                                      &options, &result, NULL));
+                                                      &options, &result, NULL, NULL));
     result = before;
     pairs.num = 100;
     /* A caller of 0.1.0 has a struct that ends before the sigmas. */
     sigmas[v][0] = NAN;
     pairs.struct_size = offsetof(tv_pixel_pairs, sigmas0);
     TEST_ASSERT_EQUAL_INT(TV_OK, tv_estimate_two_view(api.context, &camera0, &camera1, &pairs,
-                                                      &options, &result, NULL));
+                                                      &options, &result, NULL, NULL));
     result = before;
     pairs.struct_size = sizeof pairs;
   }
@@ -467,7 +513,7 @@ static void test_extreme_sigmas_do_no_harm(void) {
     }
     options.max_error_px = round % 4 < 2 ? 1 : 1e-3;
     TEST_ASSERT_EQUAL_INT(TV_OK, tv_estimate_two_view(api.context, &camera0, &camera1, &pairs,
-                                                      &options, &result, mask));
+                                                      &options, &result, &evidence, mask));
     expect_sound(300, 1);
   }
 }
@@ -722,6 +768,7 @@ int main(void) {
   RUN_TEST(test_cameras_are_checked);
   RUN_TEST(test_the_mask_may_not_lie_over_an_input);
   RUN_TEST(test_outputs_may_not_lie_over_a_struct_of_the_call);
+  RUN_TEST(test_evidence_is_asked_for_by_a_pointer);
   RUN_TEST(test_sigmas_out_of_range_are_refused);
   RUN_TEST(test_extreme_sigmas_do_no_harm);
   RUN_TEST(test_every_method_finds_an_exact_motion);

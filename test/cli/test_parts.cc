@@ -322,11 +322,11 @@ void test_each_camera_gets_its_own_advice() {
 }
 
 void test_a_result_without_evidence_says_nothing() {
-  tv_two_view result{};
-  TEST_ASSERT_FALSE(shift_evidence(result, tv_camera{}).has_value());
-  result.principal_point_asked_covariance[0] = 2;
-  result.principal_point_asked_px[1] = 3;
-  TEST_ASSERT_TRUE(shift_evidence(result, tv_camera{})->asked_px[1] == 3);
+  tv_evidence evidence{};
+  TEST_ASSERT_FALSE(shift_evidence(evidence, tv_camera{}).has_value());
+  evidence.principal_point_asked_covariance[0] = 2;
+  evidence.principal_point_asked_px[1] = 3;
+  TEST_ASSERT_TRUE(shift_evidence(evidence, tv_camera{})->asked_px[1] == 3);
 }
 
 Matrix3 turn_about_y(double angle) {

@@ -127,8 +127,8 @@ void test_a_reconstruction_finds_the_true_motion() {
   tv_two_view_init(&two_view);
   tv_reconstruction result;
   tv_reconstruction_init(&result);
-  TEST_ASSERT_EQUAL_INT(TV_OK,
-                        tv_reconstruct(context, &views[0], &views[1], nullptr, &two_view, &result));
+  TEST_ASSERT_EQUAL_INT(
+      TV_OK, tv_reconstruct(context, &views[0], &views[1], nullptr, &two_view, nullptr, &result));
   tv_context_free(context);
   TEST_ASSERT_EQUAL_INT(TV_KIND_CALIBRATED, two_view.kind);
   room::Mat3 R;

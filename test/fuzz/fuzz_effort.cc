@@ -123,7 +123,7 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     tv_two_view_init(&result[order]);
     tv_reconstruction_init(&found);
     FUZZ_REQUIRE(tv_reconstruct(context, &in_order[0], &in_order[1], &options, &result[order],
-                                &found) == TV_OK);
+                                nullptr, &found) == TV_OK);
     require_sound(found, options, in_order);
     num_matches[order] = found.num_matches;
   }

@@ -55,7 +55,7 @@ int matches_of(fuzz::Bytes& bytes, double pixels[2][2 * kMaxMatches], float* rat
   return count;
 }
 
-void require_sound(const tv_two_view& r, const uint8_t* mask, int count) {
+void require_sound(const tv_two_view& r, const tv_evidence& e, const uint8_t* mask, int count) {
   FUZZ_REQUIRE(fuzz::all_finite(r.R, 9) && fuzz::all_finite(r.t, 3) && fuzz::all_finite(r.E, 9));
   FUZZ_REQUIRE(fuzz::all_finite(r.F, 9) && fuzz::all_finite(r.H, 9));
   FUZZ_REQUIRE(fuzz::all_finite(r.alternative_R, 9) && fuzz::all_finite(r.alternative_t, 3));
@@ -63,16 +63,16 @@ void require_sound(const tv_two_view& r, const uint8_t* mask, int count) {
   FUZZ_REQUIRE(fuzz::all_finite(r.principal_point_shift, 2));
   FUZZ_REQUIRE(r.focal_scale >= 0 && fuzz::all_finite(&r.focal_scale, 1));
   FUZZ_REQUIRE(r.focal_sigma >= 0 && fuzz::all_finite(&r.focal_sigma, 1));
-  FUZZ_REQUIRE(r.principal_point_chi2 >= 0 && fuzz::all_finite(&r.principal_point_chi2, 1));
-  FUZZ_REQUIRE(fuzz::all_finite(r.principal_point_asked_px, 2));
-  FUZZ_REQUIRE(fuzz::all_finite(r.principal_point_asked_covariance, 3));
+  FUZZ_REQUIRE(e.principal_point_chi2 >= 0 && fuzz::all_finite(&e.principal_point_chi2, 1));
+  FUZZ_REQUIRE(fuzz::all_finite(e.principal_point_asked_px, 2));
+  FUZZ_REQUIRE(fuzz::all_finite(e.principal_point_asked_covariance, 3));
   for (int i = 0; i < 5; ++i) FUZZ_REQUIRE(r.covariance[6 * i] >= 0);
   FUZZ_REQUIRE(std::isfinite(r.median_parallax_rad) && std::isfinite(r.rms_error_px));
-  FUZZ_REQUIRE(r.coverage >= 0 && r.coverage <= 1);
+  FUZZ_REQUIRE(e.coverage >= 0 && e.coverage <= 1);
   FUZZ_REQUIRE(r.probability_wrong > 0 && r.probability_wrong <= 1);
   FUZZ_REQUIRE((r.has_R && r.has_t) || r.probability_wrong == 1);
-  FUZZ_REQUIRE(r.agreement >= 0 && r.agreement <= 1 && r.num_places >= 0);
-  FUZZ_REQUIRE(r.region_shift_rad >= 0 && r.region_shift_rad < 3.1416);
+  FUZZ_REQUIRE(e.agreement >= 0 && e.agreement <= 1 && e.num_places >= 0);
+  FUZZ_REQUIRE(e.region_shift_rad >= 0 && e.region_shift_rad < 3.1416);
   FUZZ_REQUIRE((r.verdict == TV_VERDICT_OK) == (r.reasons == 0));
   int inliers = 0;
   for (int i = 0; i < count; ++i) inliers += mask[i];
@@ -98,17 +98,19 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const int count = matches_of(bytes, pixels, ratios, sigmas);
   const bool with_sigmas = bytes.whole(0, 1) == 1;
   tv_two_view result[2];
+  tv_evidence evidence[2];
   tv_status status[2];
   for (int swap = 0; swap < 2; ++swap) {
     tv_two_view_init(&result[swap]);
+    tv_evidence_init(&evidence[swap]);
     tv_pixel_pairs pairs = pairs_of(pixels[swap], pixels[1 - swap], ratios, count);
     if (with_sigmas) {
       pairs.sigmas0 = sigmas[swap];
       pairs.sigmas1 = sigmas[1 - swap];
     }
     status[swap] = tv_estimate_two_view(context, given[swap], given[1 - swap], &pairs, &options,
-                                        &result[swap], mask[swap]);
-    if (status[swap] == TV_OK) require_sound(result[swap], mask[swap], count);
+                                        &result[swap], &evidence[swap], mask[swap]);
+    if (status[swap] == TV_OK) require_sound(result[swap], evidence[swap], mask[swap], count);
     // With gravity the two orders are not compared: the views' gravities would have to be swapped.
     if (options.gravity_sigma_rad != 0) return 0;
   }

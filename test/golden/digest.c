@@ -31,7 +31,8 @@ LAYOUT(tv_match_options, 16, max_distance, 12);
 LAYOUT(tv_guided_options, 20, neighbourhood_px, 16);
 LAYOUT(tv_camera, 112, k, 48);
 LAYOUT(tv_estimate_options, 152, reserved, 148);
-LAYOUT(tv_two_view, 1040, camera_direction_rad, 1032);
+LAYOUT(tv_two_view, 920, focal_sigma, 912);
+LAYOUT(tv_evidence, 120, camera_direction_rad, 112);
 LAYOUT(tv_point, 40, reserved, 36);
 LAYOUT(tv_bundle_options, 24, hold_pose, 20);
 LAYOUT(tv_bundle_result, 256, noise_px, 248);
@@ -124,7 +125,7 @@ static void add_matches(const tv_correspondence *matches, int32_t count) {
   }
 }
 
-static void add_two_view(const tv_two_view *r) {
+static void add_two_view(const tv_two_view *r, const tv_evidence *e) {
   add_int(r->kind);
   add_int(r->verdict);
   add_int(r->reasons);
@@ -141,23 +142,24 @@ static void add_two_view(const tv_two_view *r) {
   add_doubles(r->alternative_t, 3);
   add_doubles(r->covariance, 25);
   add_doubles(r->alternative_covariance, 25);
-  add_int(r->essential_inliers);
-  add_int(r->fundamental_inliers);
-  add_int(r->homography_inliers);
-  add_int(r->rotation_inliers);
-  add_double(r->coverage);
+  add_int(e->essential_inliers);
+  add_int(e->fundamental_inliers);
+  add_int(e->homography_inliers);
+  add_int(e->rotation_inliers);
+  add_double(e->coverage);
   add_double(r->median_parallax_rad);
   add_double(r->rms_error_px);
   add_double(r->noise_px);
   add_int((int64_t)r->seed);
   add_doubles(r->principal_point_shift, 2);
-  add_double(r->principal_point_chi2);
-  add_doubles(r->principal_point_asked_px, 2);
-  add_doubles(r->principal_point_asked_covariance, 3);
-  add_doubles(&r->probability_wrong, 3); /* and agreement, region_shift_rad */
+  add_double(e->principal_point_chi2);
+  add_doubles(e->principal_point_asked_px, 2);
+  add_doubles(e->principal_point_asked_covariance, 3);
+  add_double(r->probability_wrong);
+  add_doubles(&e->agreement, 2); /* and region_shift_rad */
   add_double(r->focal_scale);
   add_double(r->focal_sigma);
-  add_doubles(&r->camera_chi2, 3); /* and camera_turn_rad, camera_direction_rad */
+  add_doubles(&e->camera_chi2, 3); /* and camera_turn_rad, camera_direction_rad */
 }
 
 static void add_points(const tv_point *points, int32_t count) {
@@ -306,10 +308,12 @@ static void estimate_with(const tv_camera *camera0, const tv_camera *camera1, tv
                           const matched *m, const tv_estimate_options *options,
                           tv_two_view *result) {
   uint8_t inliers[MAX_KEYPOINTS];
+  tv_evidence evidence;
   tv_two_view_init(result);
-  must("estimate_two_view", estimate_pixels(context, camera0, camera1, m->pixels[0], m->pixels[1],
-                                            m->ratios, m->count, options, result, inliers));
-  add_two_view(result);
+  must("estimate_two_view",
+       estimate_evidence(context, camera0, camera1, m->pixels[0], m->pixels[1], m->ratios, m->count,
+                         options, result, &evidence, inliers));
+  add_two_view(result, &evidence);
   add_bytes(inliers, (size_t)m->count);
 }
 
@@ -918,6 +922,7 @@ static void digest_reconstruct(const pair *p, tv_context *context, int32_t align
   tv_feature_options feature;
   tv_view view[2];
   tv_two_view pose;
+  tv_evidence evidence;
   tv_reconstruction cloud;
   int v;
   tv_feature_options_init(&feature);
@@ -930,10 +935,12 @@ static void digest_reconstruct(const pair *p, tv_context *context, int32_t align
     view[v] = view_of(p->image[v], &p->camera[v], NULL);
   }
   tv_two_view_init(&pose);
+  tv_evidence_init(&evidence);
   tv_reconstruction_init(&cloud);
   start();
-  must("reconstruct", tv_reconstruct(context, &view[0], &view[1], &options, &pose, &cloud));
-  add_two_view(&pose);
+  must("reconstruct",
+       tv_reconstruct(context, &view[0], &view[1], &options, &pose, &evidence, &cloud));
+  add_two_view(&pose, &evidence);
   for (v = 0; v < 2; ++v) {
     add_keypoints(cloud.keypoints[v], cloud.descriptors[v], cloud.num_keypoints[v]);
   }
@@ -966,13 +973,15 @@ static void digest_effort(const pair *p, const tv_limits *limits) {
   start();
   for (rung = 2; rung < 4; ++rung) {
     tv_two_view pose;
+    tv_evidence evidence;
     tv_reconstruction found;
     options.effort = rung;
     feature.max_keypoints = keypoints_of_rung[rung];
     tv_two_view_init(&pose);
+    tv_evidence_init(&evidence);
     tv_reconstruction_init(&found);
-    must("effort", tv_reconstruct(context, &view[0], &view[1], &options, &pose, &found));
-    add_two_view(&pose);
+    must("effort", tv_reconstruct(context, &view[0], &view[1], &options, &pose, &evidence, &found));
+    add_two_view(&pose, &evidence);
     for (v = 0; v < 2; ++v) {
       add_keypoints(found.keypoints[v], found.descriptors[v], found.num_keypoints[v]);
       add_bytes(found.tilts[v], (size_t)found.num_keypoints[v]);

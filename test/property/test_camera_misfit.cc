@@ -60,18 +60,18 @@ void make_pair(int k, const tv_camera& camera, const Vec3& turn0, const Vec3& tu
   }
 }
 
-tv_two_view estimated(const tv_camera& camera, bool swapped = false, double sigma = -1,
-                      double focal_sigma = 0) {
+EstimatedPair estimated(const tv_camera& camera, bool swapped = false, double sigma = -1,
+                        double focal_sigma = 0) {
   tv_estimate_options options;
   tv_estimate_options_init(&options);
   if (sigma >= 0) options.readout_turn_sigma_rad = sigma;
   options.focal_sigma0 = options.focal_sigma1 = focal_sigma;
-  tv_two_view result;
-  tv_two_view_init(&result);
+  EstimatedPair result;
+  tv_two_view_init_sized(&result, sizeof(tv_two_view));
   const int a = swapped ? 1 : 0;
-  TEST_ASSERT_EQUAL_INT(
-      TV_OK, estimate_pixels(api.context, &camera, &camera, pair.pixels[a], pair.pixels[1 - a],
-                             nullptr, pair.options.num, &options, &result, nullptr));
+  TEST_ASSERT_EQUAL_INT(TV_OK, estimate_evidence(api.context, &camera, &camera, pair.pixels[a],
+                                                 pair.pixels[1 - a], nullptr, pair.options.num,
+                                                 &options, &result, &result.evidence, nullptr));
   return result;
 }
 
@@ -94,11 +94,12 @@ void test_a_camera_that_stands_still_is_not_contradicted(void) {
   for (const tv_camera& camera : kCameras) {
     for (int k = 0; k < num_pairs; ++k) {
       make_pair(k, camera, Vec3::Zero(), Vec3::Zero());
-      const tv_two_view tested = estimated(camera), untested = estimated(camera, false, 0);
-      TEST_ASSERT_TRUE(tested.camera_chi2 < kLimit);
-      TEST_ASSERT_TRUE(tested.camera_turn_rad == 0 && tested.camera_direction_rad == 0);
+      const EstimatedPair tested = estimated(camera), untested = estimated(camera, false, 0);
+      TEST_ASSERT_TRUE(tested.evidence.camera_chi2 < kLimit);
+      TEST_ASSERT_TRUE(tested.evidence.camera_turn_rad == 0 &&
+                       tested.evidence.camera_direction_rad == 0);
       TEST_ASSERT_EQUAL_HEX32(0, tested.reasons & TV_REASON_CAMERA_CONTRADICTED);
-      TEST_ASSERT_TRUE(untested.camera_chi2 == 0);
+      TEST_ASSERT_TRUE(untested.evidence.camera_chi2 == 0);
       TEST_ASSERT_TRUE(
           std::memcmp(tested.covariance, untested.covariance, sizeof tested.covariance) == 0);
     }
@@ -114,15 +115,15 @@ void test_a_rolling_shutter_is_in_the_covariance(void) {
     for (int k = 0; k < num_pairs; ++k) {
       const Vec3 turn = 0.03 * axes[k % 4].normalized();
       make_pair(k, camera, turn, k / 4 % 2 == 0 ? turn : Vec3(-turn));
-      const tv_two_view tested = estimated(camera), untested = estimated(camera, false, 0);
+      const EstimatedPair tested = estimated(camera), untested = estimated(camera, false, 0);
       if (!tested.has_covariance || tested.kind != TV_KIND_CALIBRATED) continue;
       TEST_ASSERT_TRUE(std::memcmp(tested.R, untested.R, sizeof tested.R) == 0);
       TEST_ASSERT_TRUE(std::memcmp(tested.t, untested.t, sizeof tested.t) == 0);
       ++known;
-      contradicted += tested.camera_chi2 > kLimit;
+      contradicted += tested.evidence.camera_chi2 > kLimit;
       beyond += is_beyond(tested);
       beyond_untested += is_beyond(untested);
-      const bool is_other = tested.camera_direction_rad > 10 * tv::kPi / 180;
+      const bool is_other = tested.evidence.camera_direction_rad > 10 * tv::kPi / 180;
       TEST_ASSERT_EQUAL_INT(is_other, (tested.reasons & TV_REASON_CAMERA_CONTRADICTED) != 0);
       doubted += is_other;
     }
@@ -148,7 +149,7 @@ void test_an_assumed_camera_is_contradicted_by_its_lens(void) {
     TEST_ASSERT_EQUAL_HEX32(
         0, estimated(assumed, false, -1, 0.1).reasons & TV_REASON_CAMERA_CONTRADICTED);
     make_pair(k, lens, Vec3::Zero(), Vec3::Zero());
-    const tv_two_view bent = estimated(assumed, false, -1, 0.1);
+    const EstimatedPair bent = estimated(assumed, false, -1, 0.1);
     if (!bent.has_covariance || !is_beyond(bent)) continue;
     ++wrong;
     contradicted += (bent.reasons & TV_REASON_CAMERA_CONTRADICTED) != 0;
@@ -165,11 +166,11 @@ void test_the_evidence_does_not_depend_on_the_order_of_the_views(void) {
   int contradicted = 0;
   for (int k = 0; k < 20; ++k) {
     make_pair(k, camera, Vec3(0.03, 0.01, 0), Vec3(0.02, 0, -0.02));
-    const tv_two_view forward = estimated(camera), backward = estimated(camera, true);
-    TEST_ASSERT_TRUE(std::memcmp(&forward.camera_chi2, &backward.camera_chi2, 3 * sizeof(double)) ==
-                     0);
+    const EstimatedPair forward = estimated(camera), backward = estimated(camera, true);
+    TEST_ASSERT_TRUE(std::memcmp(&forward.evidence.camera_chi2, &backward.evidence.camera_chi2,
+                                 3 * sizeof(double)) == 0);
     TEST_ASSERT_EQUAL_HEX32(forward.reasons, backward.reasons);
-    contradicted += forward.camera_chi2 > kLimit;
+    contradicted += forward.evidence.camera_chi2 > kLimit;
   }
   TEST_ASSERT_TRUE(contradicted > 10);
 }
@@ -182,7 +183,7 @@ void test_another_principal_point_is_in_the_covariance(void) {
   int beyond = 0, beyond_untested = 0;
   for (int k = 0; k < num_pairs; ++k) {
     make_pair(k, right, Vec3::Zero(), Vec3::Zero());
-    const tv_two_view tested = estimated(told), untested = estimated(told, false, 0);
+    const EstimatedPair tested = estimated(told), untested = estimated(told, false, 0);
     if (!tested.has_covariance || !untested.has_covariance) continue;
     beyond += is_beyond(tested);
     beyond_untested += is_beyond(untested);

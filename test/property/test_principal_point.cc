@@ -42,19 +42,19 @@ void make_pair(int k, int num, const tv_camera& camera0, const tv_camera& camera
 }
 
 tv_status estimate(const tv_camera& camera0, const tv_camera& camera1, double sigma, bool swapped,
-                   tv_two_view* result) {
+                   EstimatedPair* result) {
   tv_estimate_options options;
   tv_estimate_options_init(&options);
   options.principal_point_sigma = sigma;
-  tv_two_view_init(result);
+  tv_two_view_init_sized(result, sizeof(tv_two_view));
   const int a = swapped ? 1 : 0;
-  return estimate_pixels(api.context, swapped ? &camera1 : &camera0, swapped ? &camera0 : &camera1,
-                         pair.pixels[a], pair.pixels[1 - a], nullptr, pair.options.num, &options,
-                         result, nullptr);
+  return estimate_evidence(api.context, swapped ? &camera1 : &camera0,
+                           swapped ? &camera0 : &camera1, pair.pixels[a], pair.pixels[1 - a],
+                           nullptr, pair.options.num, &options, result, &result->evidence, nullptr);
 }
 
-tv_two_view estimated(const tv_camera& camera, double sigma = 0.01) {
-  tv_two_view result;
+EstimatedPair estimated(const tv_camera& camera, double sigma = 0.01) {
+  EstimatedPair result;
   TEST_ASSERT_EQUAL_INT(TV_OK, estimate(camera, camera, sigma, false, &result));
   return result;
 }
@@ -65,33 +65,35 @@ tv_camera moved(tv_camera camera, double x, double y) {
   return camera;
 }
 
-bool has_shift(const tv_two_view& r) {
+bool has_shift(const EstimatedPair& r) {
   return r.principal_point_shift[0] != 0 || r.principal_point_shift[1] != 0;
 }
 
-double pose_error_deg(const tv_two_view& r) {
+double pose_error_deg(const EstimatedPair& r) {
   if (!r.has_t) return 10;
   return std::fmin(10, std::fmax(scene::rotation_error_deg(r.R, pair.R),
                                  scene::translation_error_deg(r.t, pair.t)));
 }
 
 // The estimate with the library's default options.
-tv_two_view by_default(const tv_camera& camera) {
-  tv_two_view result;
-  tv_two_view_init(&result);
-  TEST_ASSERT_EQUAL_INT(
-      TV_OK, estimate_pixels(api.context, &camera, &camera, pair.pixels[0], pair.pixels[1], nullptr,
-                             pair.options.num, nullptr, &result, nullptr));
+EstimatedPair by_default(const tv_camera& camera) {
+  EstimatedPair result;
+  tv_two_view_init_sized(&result, sizeof(tv_two_view));
+  TEST_ASSERT_EQUAL_INT(TV_OK, estimate_evidence(api.context, &camera, &camera, pair.pixels[0],
+                                                 pair.pixels[1], nullptr, pair.options.num, nullptr,
+                                                 &result, &result.evidence, nullptr));
   return result;
 }
 
-bool has_evidence(const tv_two_view& r) { return r.principal_point_asked_covariance[0] > 0; }
+bool has_evidence(const EstimatedPair& r) {
+  return r.evidence.principal_point_asked_covariance[0] > 0;
+}
 
 // All three fields of the evidence, one after the other in the struct.
 constexpr int kNumEvidence = 6;
-const double* evidence_of(const tv_two_view& r) { return &r.principal_point_chi2; }
+const double* evidence_of(const EstimatedPair& r) { return &r.evidence.principal_point_chi2; }
 
-void assert_equal_evidence(const tv_two_view& a, const tv_two_view& b) {
+void assert_equal_evidence(const EstimatedPair& a, const EstimatedPair& b) {
   TEST_ASSERT_TRUE(std::memcmp(evidence_of(a), evidence_of(b), kNumEvidence * sizeof(double)) == 0);
 }
 
@@ -100,7 +102,7 @@ void test_by_default_the_camera_is_as_given(void) {
   int contradicted = 0;
   for (int k = 0; k < 40; ++k) {
     make_pair(k, 400, right, right);
-    const tv_two_view r = by_default(told), with_0 = estimated(told, 0);
+    const EstimatedPair r = by_default(told), with_0 = estimated(told, 0);
     TEST_ASSERT_TRUE(std::memcmp(&r, &with_0, sizeof r) == 0);
     TEST_ASSERT_FALSE(has_shift(r));
     tv_camera_pair corrected;
@@ -109,16 +111,17 @@ void test_by_default_the_camera_is_as_given(void) {
     TEST_ASSERT_TRUE(std::memcmp(&corrected.camera1, &told, sizeof told) == 0);
     TEST_ASSERT_TRUE(std::memcmp(corrected.cam1_from_cam0_R, r.R, sizeof r.R) == 0);
     TEST_ASSERT_TRUE(std::memcmp(corrected.cam1_from_cam0_t, r.t, sizeof r.t) == 0);
-    contradicted += r.principal_point_chi2 > 13.8155;
+    contradicted += r.evidence.principal_point_chi2 > 13.8155;
   }
   TEST_ASSERT_TRUE(contradicted > 10);  // what stayed was wrong
 }
 
 // The squared Mahalanobis distance, under its stated covariance, of the shift that the matches ask
 // for from the true shift.
-double distance_sq(const tv_two_view& r, double dx, double dy) {
-  const double* c = r.principal_point_asked_covariance;
-  const double x = r.principal_point_asked_px[0] - dx, y = r.principal_point_asked_px[1] - dy;
+double distance_sq(const EstimatedPair& r, double dx, double dy) {
+  const double* c = r.evidence.principal_point_asked_covariance;
+  const double x = r.evidence.principal_point_asked_px[0] - dx,
+               y = r.evidence.principal_point_asked_px[1] - dy;
   return (c[2] * x * x - 2 * c[1] * x * y + c[0] * y * y) / (c[0] * c[2] - c[1] * c[1]);
 }
 
@@ -128,12 +131,12 @@ void check_chi_square(const char* title, const tv_camera& right) {
   int known = 0, above_median = 0, above_95 = 0, above_999 = 0, outside_95 = 0;
   for (int k = 0; k < total; ++k) {
     make_pair(k, 100 + k % 300, right, right);
-    const tv_two_view r = by_default(right);
+    const EstimatedPair r = by_default(right);
     if (!has_evidence(r)) continue;
     ++known;
-    above_median += r.principal_point_chi2 > 1.3863;
-    above_95 += r.principal_point_chi2 > 5.9915;
-    above_999 += r.principal_point_chi2 > 13.8155;
+    above_median += r.evidence.principal_point_chi2 > 1.3863;
+    above_95 += r.evidence.principal_point_chi2 > 5.9915;
+    above_999 += r.evidence.principal_point_chi2 > 13.8155;
     outside_95 += distance_sq(r, 0, 0) > 5.9915;
   }
   std::printf(
@@ -161,11 +164,11 @@ void check_asked(const char* title, const tv_camera& right) {
   int known = 0, within = 0, contradicted = 0;
   for (int k = 0; k < num_pairs; ++k) {
     make_pair(k, 400, right, right);
-    const tv_two_view r = by_default(moved(right, -x, -y));
+    const EstimatedPair r = by_default(moved(right, -x, -y));
     if (!has_evidence(r)) continue;
     ++known;
     within += distance_sq(r, x, y) < 5.9915;
-    contradicted += r.principal_point_chi2 > 13.8155;
+    contradicted += r.evidence.principal_point_chi2 > 13.8155;
   }
   std::printf(
       "%s, off by %.1f, %.1f px: asked for within the 95 %% ellipse in %.1f %% of %d, "
@@ -189,8 +192,8 @@ void test_the_evidence_depends_neither_on_sigma_nor_on_the_order_of_the_views(vo
   int shifts = 0;
   for (int k = 0; k < 20; ++k) {
     make_pair(k, 400, right, right);
-    const tv_two_view as_given = by_default(told), freed = estimated(told);
-    tv_two_view backward;
+    const EstimatedPair as_given = by_default(told), freed = estimated(told);
+    EstimatedPair backward;
     estimate(told, told, 0, true, &backward);
     TEST_ASSERT_TRUE(has_evidence(as_given));
     assert_equal_evidence(as_given, backward);
@@ -203,16 +206,16 @@ void test_the_evidence_depends_neither_on_sigma_nor_on_the_order_of_the_views(vo
 void test_the_evidence_is_zero_where_it_is_not_known(void) {
   const tv_camera camera = scene::pinhole();
   const double zeros[kNumEvidence] = {};
-  tv_two_view result;
+  EstimatedPair result;
   tv_camera other = camera;
   other.fx += 1e-9;
   make_pair(1, 400, camera, camera);
   estimate(camera, other, 0, false, &result);
   TEST_ASSERT_EQUAL_INT(TV_KIND_CALIBRATED, result.kind);
   TEST_ASSERT_TRUE(std::memcmp(zeros, evidence_of(result), sizeof zeros) == 0);
-  TEST_ASSERT_EQUAL_INT(
-      TV_OK, estimate_pixels(api.context, nullptr, nullptr, pair.pixels[0], pair.pixels[1], nullptr,
-                             pair.options.num, nullptr, &result, nullptr));
+  TEST_ASSERT_EQUAL_INT(TV_OK, estimate_evidence(api.context, nullptr, nullptr, pair.pixels[0],
+                                                 pair.pixels[1], nullptr, pair.options.num, nullptr,
+                                                 &result, &result.evidence, nullptr));
   TEST_ASSERT_EQUAL_INT(TV_KIND_UNCALIBRATED, result.kind);
   TEST_ASSERT_TRUE(std::memcmp(zeros, evidence_of(result), sizeof zeros) == 0);
   for (const scene::Kind kind :
@@ -285,7 +288,7 @@ void compare(const char* title, const tv_camera& right, double most_error_px, do
     const double dx = 0.01 * right.fx * scene::normal(&random);
     const double dy = 0.01 * right.fy * scene::normal(&random);
     const tv_camera told = moved(right, -dx, -dy);
-    const tv_two_view exact = estimated(told, 0), freed = estimated(told);
+    const EstimatedPair exact = estimated(told, 0), freed = estimated(told);
     TEST_ASSERT_FALSE(has_shift(exact));
     sum[0] += pose_error_deg(exact);
     sum[1] += pose_error_deg(freed);
@@ -325,7 +328,7 @@ void test_two_cameras_are_taken_as_they_are(void) {
   other.fx += 1e-9;
   for (int k = 0; k < 20; ++k) {
     make_pair(k, 400, right, right);
-    tv_two_view result;
+    EstimatedPair result;
     TEST_ASSERT_EQUAL_INT(TV_OK, estimate(told, other, 0.01, false, &result));
     TEST_ASSERT_FALSE(has_shift(result));
   }
@@ -336,7 +339,7 @@ void test_a_camera_that_is_not_this_one_stays(void) {
   const tv_camera right = scene::pinhole(), told = moved(right, 100, 60);
   for (int k = 0; k < 20; ++k) {
     make_pair(k, 400, right, right);
-    const tv_two_view r = estimated(told);
+    const EstimatedPair r = estimated(told);
     for (double shift : r.principal_point_shift)
       TEST_ASSERT_TRUE(std::fabs(shift) <= 6 * 0.01 * 505);
   }
@@ -347,7 +350,7 @@ void test_swapped_views_give_the_same_shift(void) {
   int shifts = 0;
   for (int k = 0; k < 20; ++k) {
     make_pair(k, 400, right, right);
-    tv_two_view forward, backward;
+    EstimatedPair forward, backward;
     estimate(told, told, 0.01, false, &forward);
     estimate(told, told, 0.01, true, &backward);
     for (int i = 0; i < 2; ++i) {
@@ -364,7 +367,7 @@ void test_swapped_views_give_the_same_shift(void) {
 void test_matrices_are_of_the_corrected_camera(void) {
   const tv_camera right = scene::pinhole(), told = moved(right, 12, -12);
   make_pair(3, 400, right, right);
-  const tv_two_view r = estimated(told);
+  const EstimatedPair r = estimated(told);
   TEST_ASSERT_TRUE(has_shift(r));
   tv_camera_pair corrected;
   tv_corrected_pair(&r, &told, &told, &corrected);
@@ -458,7 +461,7 @@ void test_the_gradient_follows_differences(void) {
 
 void test_options_out_of_range_are_refused(void) {
   make_pair(1, 50, scene::pinhole(), scene::pinhole());
-  tv_two_view result;
+  EstimatedPair result;
   const tv_camera c = scene::pinhole();
   for (double bad : {-1e-9, 0.1000001, 1e9}) {
     TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, estimate(c, c, bad, false, &result));

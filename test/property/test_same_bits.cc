@@ -81,7 +81,7 @@ void estimate(tv_context* context, int num, bool calibrated, bool with_sigmas, R
   tv_two_view_init(&r->two_view);
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_estimate_two_view(context, calibrated ? &pair.camera[0] : nullptr,
                                                     calibrated ? &pair.camera[1] : nullptr, &pairs,
-                                                    nullptr, &r->two_view, r->mask));
+                                                    nullptr, &r->two_view, nullptr, r->mask));
 }
 
 void test_bytes_depend_on_the_matches_alone(void) {

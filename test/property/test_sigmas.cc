@@ -250,8 +250,8 @@ tv_two_view estimate(const tv_camera& c0, const tv_camera& c1, const double* pix
   tv_pixel_pairs pairs = pairs_of(pixels0, pixels1, nullptr, num);
   pairs.sigmas0 = sigmas0;
   pairs.sigmas1 = sigmas1;
-  TEST_ASSERT_EQUAL_INT(TV_OK,
-                        tv_estimate_two_view(context, &c0, &c1, &pairs, options, &result, mask));
+  TEST_ASSERT_EQUAL_INT(
+      TV_OK, tv_estimate_two_view(context, &c0, &c1, &pairs, options, &result, nullptr, mask));
   return result;
 }
 

@@ -32,13 +32,13 @@ tv_estimate_options defaults(int method) {
   return options;
 }
 
-tv_two_view estimate(const tv_camera* cameras, const double* pixels0, const double* pixels1,
-                     const float* ratios, int num, const tv_estimate_options& options) {
-  tv_two_view result;
-  tv_two_view_init(&result);
+EstimatedPair estimate(const tv_camera* cameras, const double* pixels0, const double* pixels1,
+                       const float* ratios, int num, const tv_estimate_options& options) {
+  EstimatedPair result;
+  tv_two_view_init_sized(&result, sizeof(tv_two_view));
   const tv_camera* second = cameras == nullptr ? nullptr : cameras + 1;
-  TEST_ASSERT_EQUAL_INT(TV_OK, estimate_pixels(context, cameras, second, pixels0, pixels1, ratios,
-                                               num, &options, &result, mask));
+  TEST_ASSERT_EQUAL_INT(TV_OK, estimate_evidence(context, cameras, second, pixels0, pixels1, ratios,
+                                                 num, &options, &result, &result.evidence, mask));
   const double* arrays[] = {result.R,
                             result.t,
                             result.E,
@@ -48,7 +48,7 @@ tv_two_view estimate(const tv_camera* cameras, const double* pixels0, const doub
                             result.alternative_t,
                             result.covariance};
   const int sizes[] = {9, 3, 9, 9, 9, 9, 3, 25};
-  double sum = result.coverage + result.median_parallax_rad + result.rms_error_px;
+  double sum = result.evidence.coverage + result.median_parallax_rad + result.rms_error_px;
   for (int a = 0; a < 8; ++a) {
     for (int k = 0; k < sizes[a]; ++k) sum += arrays[a][k];
   }
@@ -56,11 +56,11 @@ tv_two_view estimate(const tv_camera* cameras, const double* pixels0, const doub
   int inliers = 0;
   for (int i = 0; i < num; ++i) inliers += mask[i];
   TEST_ASSERT_EQUAL_INT(result.num_inliers, inliers);
-  TEST_ASSERT_TRUE(result.coverage >= 0 && result.coverage <= 1);
+  TEST_ASSERT_TRUE(result.evidence.coverage >= 0 && result.evidence.coverage <= 1);
   return result;
 }
 
-tv_two_view estimate_pair(bool calibrated, int method) {
+EstimatedPair estimate_pair(bool calibrated, int method) {
   return estimate(calibrated ? pair.options.camera : nullptr, pair.pixels[0], pair.pixels[1],
                   pair.ratios, pair.options.num, defaults(method));
 }
@@ -92,7 +92,7 @@ void test_config_names_the_kind_of_pair(void) {
             options_of(kinds[k], 300, trial % 2 == 0 ? 0.6 : 0.9, 20 * k + trial);
         options.noise_px = trial % 4 < 2 ? 0.2 : 0.5;
         scene::make(options, &pair);
-        const tv_two_view r = estimate_pair(
+        const EstimatedPair r = estimate_pair(
             calibrated == 1, calibrated == 1 ? TV_SOLVER_FIVE_POINT : TV_SOLVER_SEVEN_POINT);
         right += r.kind == configs[calibrated][k];
       }
@@ -105,7 +105,7 @@ void test_each_kind_has_what_it_promises(void) {
   for (Kind kind : {Kind::kGeneral, Kind::kPlanar, Kind::kRotation, Kind::kStill}) {
     scene::make(options_of(kind, 300, 0.7, 200), &pair);
     for (int calibrated = 0; calibrated < 2; ++calibrated) {
-      const tv_two_view r = estimate_pair(
+      const EstimatedPair r = estimate_pair(
           calibrated == 1, calibrated == 1 ? TV_SOLVER_FIVE_POINT : TV_SOLVER_SEVEN_POINT);
       const bool full = r.kind == TV_KIND_CALIBRATED || r.kind == TV_KIND_PLANAR;
       const bool rotation =
@@ -117,7 +117,7 @@ void test_each_kind_has_what_it_promises(void) {
       TEST_ASSERT_EQUAL_INT(r.kind == TV_KIND_PLANAR || r.kind == TV_KIND_PLANAR_OR_PANORAMIC,
                             r.has_H);
       TEST_ASSERT_EQUAL_INT(r.verdict != TV_VERDICT_OK, r.reasons != 0);
-      TEST_ASSERT_EQUAL_INT(calibrated == 1 ? -1 : 0, r.fundamental_inliers < 0 ? -1 : 0);
+      TEST_ASSERT_EQUAL_INT(calibrated == 1 ? -1 : 0, r.evidence.fundamental_inliers < 0 ? -1 : 0);
       if (rotation) {
         TEST_ASSERT_TRUE(scene::rotation_error_deg(r.R, pair.R) < 0.2);
         TEST_ASSERT_EQUAL_INT(TV_VERDICT_REFUSED, r.verdict);
@@ -136,7 +136,7 @@ void test_random_matches_are_degenerate(void) {
     for (int trial = 0; trial < 8; ++trial) {
       scene::make(options_of(Kind::kGeneral, num[k], 0, 300 + 20 * k + trial), &pair);
       for (int m = 0; m < 3; ++m) {
-        const tv_two_view r = estimate_pair(m == 0 || trial % 2 == 0, methods[m]);
+        const EstimatedPair r = estimate_pair(m == 0 || trial % 2 == 0, methods[m]);
         accepted += r.kind != TV_KIND_DEGENERATE;
         TEST_ASSERT_EQUAL_INT(r.kind == TV_KIND_DEGENERATE, r.verdict == TV_VERDICT_REFUSED);
         TEST_ASSERT_EQUAL_INT(r.kind == TV_KIND_DEGENERATE, r.num_inliers == 0);
@@ -157,7 +157,7 @@ void test_every_pair_of_lenses_gives_the_pose(void) {
         options.camera[0] = lenses[a];
         options.camera[1] = lenses[b];
         scene::make(options, &pair);
-        const tv_two_view r = estimate_pair(true, TV_SOLVER_FIVE_POINT);
+        const EstimatedPair r = estimate_pair(true, TV_SOLVER_FIVE_POINT);
         TEST_ASSERT_EQUAL_INT(TV_KIND_CALIBRATED, r.kind);
         sum += std::fmax(scene::rotation_error_deg(r.R, pair.R),
                          scene::translation_error_deg(r.t, pair.t));
@@ -188,7 +188,7 @@ void test_degenerate_points_end_and_give_no_pose(void) {
       for (int k = 0; k < 2; ++k) a[2 * i + k] = p[k], b[2 * i + k] = p[2 + k];
     }
     for (int c = 0; c < 3; ++c) {
-      const tv_two_view r =
+      const EstimatedPair r =
           estimate(lenses[c], a, b, nullptr, 1000, defaults(TV_SOLVER_FIVE_POINT));
       if (kind == 0 || kind == 1 || kind == 4 || kind == 5) {
         TEST_ASSERT_EQUAL_INT(0, r.has_t);
@@ -208,7 +208,7 @@ void test_covariance_covers_the_error(void) {
     scene::Options options = options_of(Kind::kGeneral, 200, 1, 600 + trial);
     options.noise_px = 0.3;
     scene::make(options, &pair);
-    const tv_two_view r = estimate_pair(true, TV_SOLVER_FIVE_POINT);
+    const EstimatedPair r = estimate_pair(true, TV_SOLVER_FIVE_POINT);
     if (r.kind != TV_KIND_CALIBRATED) continue;
     TEST_ASSERT_EQUAL_INT(1, r.has_covariance);
     const tv::Mat3 d = pair.R * tv::Mat3(Eigen::Map<const tv::Mat3>(r.R)).transpose();
@@ -242,7 +242,7 @@ void test_a_direction_that_is_stated_to_be_uncertain_is_low_parallax(void) {
       pixel[0] += 1.6 * std::sin(x);
       pixel[1] += 1.6 * std::cos(y + x / 1.5);
     }
-    const tv_two_view r = estimate_pair(true, TV_SOLVER_FIVE_POINT);
+    const EstimatedPair r = estimate_pair(true, TV_SOLVER_FIVE_POINT);
     if (r.has_covariance == 0) continue;
     const tv::Vec3 t(r.t[0], r.t[1], r.t[2]);
     if (!(tv::direction_sigma(t, r.covariance) > 13.5 * tv::kPi / 180)) continue;
@@ -284,15 +284,15 @@ void test_matches_that_ask_for_the_opposite_direction_are_repeated_structure(voi
     put_posts(kCopies, kSame, 0.75, R, &random);
     // The same pose without the posts that are matched with themselves: nothing contradicts it.
     for (int num : {kCopies, kCopies + kSame}) {
-      const tv_two_view r =
+      const EstimatedPair r =
           estimate(pair.options.camera, pair.pixels[0], pair.pixels[1], nullptr, num, options);
       TEST_ASSERT_TRUE(Eigen::Map<const Vec3>(r.t).dot(R * Vec3(1, 0, 0)) > 0);
       TEST_ASSERT_EQUAL_HEX32(num == kCopies ? 0 : TV_REASON_REPEATED_STRUCTURE, r.reasons);
     }
     // A few wrong matches of small parallax behind the cameras do not: noise alone can make them.
     put_posts(kCopies, kSame, 0.3, R, &random);
-    const tv_two_view r = estimate(pair.options.camera, pair.pixels[0], pair.pixels[1], nullptr,
-                                   kCopies + kSame, options);
+    const EstimatedPair r = estimate(pair.options.camera, pair.pixels[0], pair.pixels[1], nullptr,
+                                     kCopies + kSame, options);
     TEST_ASSERT_EQUAL_HEX32(0, r.reasons);
   }
 }

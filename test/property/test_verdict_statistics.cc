@@ -62,7 +62,7 @@ double pose_error_deg(const tv_two_view& r) {
   return std::fmax(rotation, scene::translation_error_deg(r.t, pair.t));
 }
 
-void print_pair(const char* what, const tv_two_view& r, uint64_t seed) {
+void print_pair(const char* what, const EstimatedPair& r, uint64_t seed) {
   if (!verbose) return;
   std::printf(
       "%s: %s seed %llu: %s %s reasons %x, %d matches, inliers %d (E %d H %d R %d), "
@@ -70,19 +70,19 @@ void print_pair(const char* what, const tv_two_view& r, uint64_t seed) {
       what, pair_kinds::name_of(pair.kind), static_cast<unsigned long long>(seed),
       tv_kind_string(static_cast<tv_kind>(r.kind)),
       tv_verdict_string(static_cast<tv_verdict>(r.verdict)), r.reasons, r.num_matches,
-      r.num_inliers, r.essential_inliers, r.homography_inliers, r.rotation_inliers,
-      r.median_parallax_rad * 180 / tv::kPi, r.rms_error_px, r.noise_px, pair.noise_px, r.coverage,
-      pose_error_deg(r));
+      r.num_inliers, r.evidence.essential_inliers, r.evidence.homography_inliers,
+      r.evidence.rotation_inliers, r.median_parallax_rad * 180 / tv::kPi, r.rms_error_px,
+      r.noise_px, pair.noise_px, r.evidence.coverage, pose_error_deg(r));
 }
 
 void judge(uint64_t seed) {
   tv_estimate_options options;
   tv_estimate_options_init(&options);
-  tv_two_view r;
-  tv_two_view_init(&r);
-  TEST_ASSERT_EQUAL_INT(TV_OK,
-                        estimate_pixels(context, &pair.camera[0], &pair.camera[1], pair.pixels[0],
-                                        pair.pixels[1], nullptr, pair.num, &options, &r, nullptr));
+  EstimatedPair r;
+  tv_two_view_init_sized(&r, sizeof(tv_two_view));
+  TEST_ASSERT_EQUAL_INT(TV_OK, estimate_evidence(context, &pair.camera[0], &pair.camera[1],
+                                                 pair.pixels[0], pair.pixels[1], nullptr, pair.num,
+                                                 &options, &r, &r.evidence, nullptr));
   Count& c = counts[pair.kind];
   ++c.pairs;
   const bool named = named_right(r), ok = r.verdict == TV_VERDICT_OK;

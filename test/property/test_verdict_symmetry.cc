@@ -21,37 +21,33 @@ int num_pairs = kSanitized ? 100 : 400;
 uint64_t base_seed = 1;
 bool verbose = false;
 
-tv_two_view estimate(bool calibrated, bool swapped, const float* of_matches) {
+EstimatedPair estimate(bool calibrated, bool swapped, const float* of_matches) {
   tv_estimate_options options;
   tv_estimate_options_init(&options);
   if (!calibrated) options.method = TV_SOLVER_EIGHT_POINT;
-  tv_two_view r;
-  tv_two_view_init(&r);
+  EstimatedPair r;
+  tv_two_view_init_sized(&r, sizeof(tv_two_view));
   const int first = swapped ? 1 : 0;
   TEST_ASSERT_EQUAL_INT(
-      TV_OK, estimate_pixels(context, calibrated ? &pair.camera[first] : nullptr,
-                             calibrated ? &pair.camera[1 - first] : nullptr, pair.pixels[first],
-                             pair.pixels[1 - first], of_matches, pair.num, &options, &r, nullptr));
+      TV_OK, estimate_evidence(context, calibrated ? &pair.camera[first] : nullptr,
+                               calibrated ? &pair.camera[1 - first] : nullptr, pair.pixels[first],
+                               pair.pixels[1 - first], of_matches, pair.num, &options, &r,
+                               &r.evidence, nullptr));
   return r;
 }
 
-bool same_report(const tv_two_view& a, const tv_two_view& b) {
-  return a.kind == b.kind && a.verdict == b.verdict && a.reasons == b.reasons &&
-         a.coverage == b.coverage && a.probability_wrong == b.probability_wrong &&
-         a.agreement == b.agreement && a.region_shift_rad == b.region_shift_rad &&
-         a.camera_chi2 == b.camera_chi2 && a.camera_turn_rad == b.camera_turn_rad &&
-         a.camera_direction_rad == b.camera_direction_rad && a.num_places == b.num_places &&
-         a.num_matches == b.num_matches && a.num_inliers == b.num_inliers &&
-         a.num_iterations == b.num_iterations && a.essential_inliers == b.essential_inliers &&
-         a.fundamental_inliers == b.fundamental_inliers &&
-         a.homography_inliers == b.homography_inliers && a.rotation_inliers == b.rotation_inliers &&
-         a.median_parallax_rad == b.median_parallax_rad && a.rms_error_px == b.rms_error_px &&
-         a.noise_px == b.noise_px && a.has_R == b.has_R && a.has_t == b.has_t &&
-         a.has_H == b.has_H && a.has_F == b.has_F && a.has_covariance == b.has_covariance &&
-         a.has_alternative == b.has_alternative;
+bool same_report(const EstimatedPair& a, const EstimatedPair& b) {
+  return std::memcmp(&a.evidence, &b.evidence, sizeof a.evidence) == 0 && a.kind == b.kind &&
+         a.verdict == b.verdict && a.reasons == b.reasons &&
+         a.probability_wrong == b.probability_wrong && a.num_matches == b.num_matches &&
+         a.num_inliers == b.num_inliers && a.num_iterations == b.num_iterations &&
+         a.num_still == b.num_still && a.median_parallax_rad == b.median_parallax_rad &&
+         a.rms_error_px == b.rms_error_px && a.noise_px == b.noise_px && a.has_R == b.has_R &&
+         a.has_t == b.has_t && a.has_H == b.has_H && a.has_F == b.has_F &&
+         a.has_covariance == b.has_covariance && a.has_alternative == b.has_alternative;
 }
 
-bool transposed(const tv_two_view& a, const tv_two_view& b) {
+bool transposed(const EstimatedPair& a, const EstimatedPair& b) {
   for (int k = 0; k < 9; ++k) {
     if (a.has_R != 0 && a.R[k] != b.R[3 * (k % 3) + k / 3]) return false;
   }
@@ -68,8 +64,8 @@ void test_swapped_images_get_the_same_verdict(void) {
       const uint64_t seed = base_seed * 1000003 + static_cast<uint64_t>(kind * 100003 + k);
       pair_kinds::make(static_cast<pair_kinds::Kind>(kind), ranges, seed, &pair);
       const bool calibrated = k % 8 != 7;
-      const tv_two_view a = estimate(calibrated, false, nullptr);
-      const tv_two_view b = estimate(calibrated, true, nullptr);
+      const EstimatedPair a = estimate(calibrated, false, nullptr);
+      const EstimatedPair b = estimate(calibrated, true, nullptr);
       const bool same = same_report(a, b) && transposed(a, b);
       different += !same;
       crowded += (a.reasons & TV_REASON_CROWDED_MATCHES) != 0;
@@ -77,7 +73,7 @@ void test_swapped_images_get_the_same_verdict(void) {
       if (!same && verbose) {
         std::printf("%s seed %llu: verdict %d %d reasons %x %x coverage %.3f %.3f\n",
                     pair_kinds::name_of(kind), static_cast<unsigned long long>(seed), a.verdict,
-                    b.verdict, a.reasons, b.reasons, a.coverage, b.coverage);
+                    b.verdict, a.reasons, b.reasons, a.evidence.coverage, b.evidence.coverage);
       }
     }
     std::printf("%-14s %6d pairs, %d differ when swapped; %d ok, %d crowded\n",
@@ -108,7 +104,7 @@ void test_matches_that_are_the_same_in_both_orders(void) {
     }
     pair.num = 2 * half;
     TEST_ASSERT_TRUE(same_report(estimate(true, false, nullptr), estimate(true, true, nullptr)));
-    const tv_two_view a = estimate(true, false, ratios), b = estimate(true, true, ratios);
+    const EstimatedPair a = estimate(true, false, ratios), b = estimate(true, true, ratios);
     TEST_ASSERT_TRUE(same_report(a, b) && transposed(a, b));
   }
 }

@@ -93,14 +93,34 @@ static inline tv_status align_keypoints_of(tv_context *context, tv_image image0,
                           num_keypoints, aligned);
 }
 
+/* With the evidence, which it initialises; null where it is not wanted. */
+static inline tv_status estimate_evidence(tv_context *context, const tv_camera *camera0,
+                                          const tv_camera *camera1, const double *pixels0,
+                                          const double *pixels1, const float *ratios,
+                                          int32_t num_matches, const tv_estimate_options *options,
+                                          tv_two_view *result, tv_evidence *evidence,
+                                          uint8_t *inlier_mask) {
+  const tv_pixel_pairs pairs = pairs_of(pixels0, pixels1, ratios, num_matches);
+  tv_evidence_init(evidence);
+  return tv_estimate_two_view(context, camera0, camera1, &pairs, options, result, evidence,
+                              inlier_mask);
+}
+
 static inline tv_status estimate_pixels(tv_context *context, const tv_camera *camera0,
                                         const tv_camera *camera1, const double *pixels0,
                                         const double *pixels1, const float *ratios,
                                         int32_t num_matches, const tv_estimate_options *options,
                                         tv_two_view *result, uint8_t *inlier_mask) {
-  const tv_pixel_pairs pairs = pairs_of(pixels0, pixels1, ratios, num_matches);
-  return tv_estimate_two_view(context, camera0, camera1, &pairs, options, result, inlier_mask);
+  return estimate_evidence(context, camera0, camera1, pixels0, pixels1, ratios, num_matches,
+                           options, result, NULL, inlier_mask);
 }
+
+#ifdef __cplusplus
+// A result with the evidence of it, by value.
+struct EstimatedPair : tv_two_view {
+  tv_evidence evidence;
+};
+#endif
 
 static inline tv_status triangulate_pixels(const tv_camera_pair *pair, const double *pixels0,
                                            const double *pixels1, int32_t num,

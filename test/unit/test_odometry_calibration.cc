@@ -36,11 +36,11 @@ Asked asked_near(double x, double y, double reach_px) {
 }
 
 void add(const Asked& asked) {
-  tv_two_view view;
-  tv_two_view_init(&view);
-  std::memcpy(view.principal_point_asked_px, asked.px, sizeof asked.px);
-  std::memcpy(view.principal_point_asked_covariance, asked.covariance, sizeof asked.covariance);
-  tv::add_evidence(view, odometry->camera.model.fx, &odometry->camera_evidence);
+  tv_evidence of_pair;
+  tv_evidence_init(&of_pair);
+  std::memcpy(of_pair.principal_point_asked_px, asked.px, sizeof asked.px);
+  std::memcpy(of_pair.principal_point_asked_covariance, asked.covariance, sizeof asked.covariance);
+  tv::add_evidence(of_pair, odometry->camera.model.fx, &odometry->camera_evidence);
 }
 
 // By how far the next call moves the principal point.

@@ -95,9 +95,9 @@ void test_inliers_are_crowded_where_they_are_in_both_images_or_on_a_line_in_one(
 
 void test_a_camera_is_contradicted_where_the_direction_would_be_another_one(void) {
   Evidence e = good();
-  e.misfit_direction_rad = 9.99 * tv::kPi / 180;
+  e.misfit.direction_rad = 9.99 * tv::kPi / 180;
   assert_reason(0, e);
-  e.misfit_direction_rad = 10.01 * tv::kPi / 180;
+  e.misfit.direction_rad = 10.01 * tv::kPi / 180;
   assert_reason(TV_REASON_CAMERA_CONTRADICTED, e);
 }
 
@@ -105,7 +105,7 @@ void test_a_camera_that_is_assumed_is_contradicted_by_any_misfit(void) {
   Evidence e = good();
   e.is_camera_assumed = true;
   assert_reason(0, e);
-  e.misfit_direction_rad = 0.01 * tv::kPi / 180;
+  e.misfit.direction_rad = 0.01 * tv::kPi / 180;
   assert_reason(TV_REASON_CAMERA_CONTRADICTED, e);
 }
 
@@ -120,17 +120,18 @@ void test_a_focal_length_that_is_open_by_more_than_an_eighth_is_doubtful(void) {
 }
 
 void test_no_rung_mends_the_cameras(void) {
-  tv_two_view pose = {};
-  pose.num_places = 20;
-  pose.reasons = TV_REASON_SECOND_MOTION;
+  tv::PairResult pose = {};
+  pose.evidence.num_places[0] = 20;
+  pose.evidence.num_places[1] = 40;
+  pose.view.reasons = TV_REASON_SECOND_MOTION;
   TEST_ASSERT_TRUE(tv::more_could_help(pose));
-  pose.camera_direction_rad = 0.01;  // the matches contradict the cameras
+  pose.evidence.misfit.direction_rad = 0.01;  // the matches contradict the cameras
   TEST_ASSERT_FALSE(tv::more_could_help(pose));
-  pose.reasons |= TV_REASON_TOO_FEW_MATCHES;
+  pose.view.reasons |= TV_REASON_TOO_FEW_MATCHES;
   TEST_ASSERT_TRUE(tv::more_could_help(pose));
-  pose.reasons = TV_REASON_LOW_PARALLAX | TV_REASON_CAMERA_CONTRADICTED;
+  pose.view.reasons = TV_REASON_LOW_PARALLAX | TV_REASON_CAMERA_CONTRADICTED;
   TEST_ASSERT_FALSE(tv::more_could_help(pose));
-  pose.num_places = 19;
+  pose.evidence.num_places[0] = 19;
   TEST_ASSERT_TRUE(tv::more_could_help(pose));
 }
 
@@ -379,18 +380,24 @@ void test_without_an_absolute_pose_there_is_one_reason(void) {
 }
 
 void test_after_guided_matching_the_first_judgement_stays(void) {
-  tv_two_view first{}, again{};
+  tv::PairResult of_first{}, of_again{};
+  tv_two_view &first = of_first.view, &again = of_again.view;
   first.has_R = first.has_t = again.has_R = again.has_t = 1;
   first.kind = again.kind = TV_KIND_CALIBRATED;
   first.num_inliers = again.num_inliers = 50;
   first.verdict = TV_VERDICT_DOUBTFUL;
   first.reasons = TV_REASON_LOW_PARALLAX;
-  first.num_places = 30;
-  first.camera_chi2 = 7;
+  of_first.evidence.num_places[0] = of_first.evidence.num_places[1] = 30;
+  of_first.evidence.misfit.chi2 = 7;
+  of_first.evidence.essential_inliers = 50;
+  of_again.evidence.kind = of_first.evidence.kind = TV_KIND_CALIBRATED;
+  of_again.evidence.essential_inliers = 60;
   again.verdict = TV_VERDICT_OK;
   TEST_ASSERT_TRUE(tv::takes_guided_estimate(first, again));
-  tv::keep_judgement(first, &again);
-  TEST_ASSERT_TRUE(again.num_places == 30 && again.camera_chi2 == 7);
+  tv::keep_judgement(of_first, &of_again);
+  tv_evidence kept;
+  tv::write_evidence(of_again.evidence, &kept);
+  TEST_ASSERT_TRUE(kept.num_places == 30 && kept.camera_chi2 == 7 && kept.essential_inliers == 60);
   TEST_ASSERT_TRUE(again.verdict == first.verdict && again.reasons == first.reasons);
   TEST_ASSERT_TRUE(tv::takes_guided_estimate(first, again));
   first.verdict = TV_VERDICT_OK;

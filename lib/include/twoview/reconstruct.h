@@ -164,14 +164,14 @@ TV_API void tv_reconstruction_init_sized(tv_reconstruction *reconstruction, size
    With bundle_adjustment, exchanged views give the inverse pose up to rounding; without it, bit for
    bit.
    options: null means the defaults.
-   two_view: initialised by tv_two_view_init; reconstruction: initialised by tv_reconstruction_init.
-   They do not overlap (TV_ERR_OVERLAP).
+   two_view: initialised by tv_two_view_init; evidence: null, or initialised by tv_evidence_init;
+   reconstruction: initialised by tv_reconstruction_init. They do not overlap (TV_ERR_OVERLAP).
    Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (an option, or a reserved field that is
    not 0), TV_ERR_CAMERA (also where the width or height of a view's image is not that of its
    camera: tv_camera_scale gives the camera of a resized image), and the statuses of the stages. */
 TV_API tv_status tv_reconstruct(tv_context *context, const tv_view *view0, const tv_view *view1,
                                 const tv_reconstruct_options *options, tv_two_view *two_view,
-                                tv_reconstruction *reconstruction);
+                                tv_evidence *evidence, tv_reconstruction *reconstruction);
 
 TV_END_DECLS
 

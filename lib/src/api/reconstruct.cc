@@ -132,24 +132,27 @@ void tv_reconstruction_init_sized(tv_reconstruction* reconstruction, size_t stru
 
 tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_view* view1,
                          const tv_reconstruct_options* options, tv_two_view* two_view,
-                         tv_reconstruction* reconstruction) {
+                         tv_evidence* evidence, tv_reconstruction* reconstruction) {
   if (context == nullptr || view0 == nullptr || view1 == nullptr || two_view == nullptr ||
       reconstruction == nullptr) {
     return TV_ERR_NULL;
   }
   tv_status status = tv::check_sized(two_view);
   if (status == TV_OK) status = tv::check_sized(reconstruction);
+  if (status == TV_OK && evidence != nullptr) status = tv::check_sized(evidence);
   if (status != TV_OK) return status;
-  if (tv::overlap(two_view, two_view->struct_size, reconstruction, reconstruction->struct_size)) {
-    return TV_ERR_OVERLAP;
-  }
+  const tv::Bytes outputs[] = {{two_view, two_view->struct_size},
+                               {evidence, evidence != nullptr ? evidence->struct_size : 0},
+                               {reconstruction, reconstruction->struct_size}};
+  if (tv::outputs_overlap(outputs, 3, 3)) return TV_ERR_OVERLAP;
   tv::PairTask task{};
   status = tv::read_task(*context, view0, view1, options, &task);
   if (status != TV_OK) return status;
   tv::PairArrays arrays;
   tv::Attempt attempt{};
   const int32_t num_points = tv::reconstruct(context, task, &arrays, &attempt);
-  tv::write_sized(attempt.estimate, two_view);
+  tv::write_sized(attempt.estimate.view, two_view);
+  tv::pack_evidence(attempt.estimate.evidence, evidence);
   tv::pack(arrays, attempt, num_points, reconstruction);
   return TV_OK;
 }

@@ -56,15 +56,14 @@ __attribute__((noinline)) void pack(const PairEstimate& estimate, tv_two_view* r
 }
 
 // Whether an output shares a byte with another argument. Not inlined, for the same reason.
-__attribute__((noinline)) bool arrays_overlap(const tv_pixel_pairs& given,
-                                              const tv_pixel_pairs* pairs,
-                                              const tv_estimate_options* options,
-                                              const tv_camera* camera0, const tv_camera* camera1,
-                                              const tv_two_view* result,
-                                              const uint8_t* inlier_mask) {
+__attribute__((noinline)) bool arrays_overlap(
+    const tv_pixel_pairs& given, const tv_pixel_pairs* pairs, const tv_estimate_options* options,
+    const tv_camera* camera0, const tv_camera* camera1, const tv_two_view* result,
+    const tv_evidence* evidence, const uint8_t* inlier_mask) {
   const size_t n = static_cast<size_t>(given.num);
   const Bytes arrays[] = {{inlier_mask, n},
                           {result, result->struct_size},
+                          {evidence, evidence != nullptr ? evidence->struct_size : 0},
                           {given.pixels0, 16 * n},
                           {given.pixels1, 16 * n},
                           {given.ratios, 4 * n},
@@ -74,10 +73,17 @@ __attribute__((noinline)) bool arrays_overlap(const tv_pixel_pairs& given,
                           {options, options != nullptr ? options->struct_size : 0},
                           {camera0, sizeof(tv_camera)},
                           {camera1, sizeof(tv_camera)}};
-  return outputs_overlap(arrays, 2, 11);
+  return outputs_overlap(arrays, 3, 12);
 }
 
 }  // namespace
+
+void pack_evidence(const Evidence& evidence, tv_evidence* written) {
+  if (written == nullptr) return;
+  tv_evidence packed;
+  write_evidence(evidence, &packed);
+  write_sized(packed, written);
+}
 
 tv_status read_estimate_options(const tv_estimate_options* options, bool calibrated,
                                 tv_estimate_options* checked) {
@@ -125,6 +131,10 @@ void tv_two_view_init_sized(tv_two_view* result, size_t struct_size) {
   tv::init_zeros(result, struct_size);
 }
 
+void tv_evidence_init_sized(tv_evidence* evidence, size_t struct_size) {
+  tv::init_zeros(evidence, struct_size);
+}
+
 tv_status tv_corrected_pair(const tv_two_view* result, const tv_camera* camera0,
                             const tv_camera* camera1, tv_camera_pair* pair) {
   if (result == nullptr || camera0 == nullptr || camera1 == nullptr || pair == nullptr) {
@@ -140,11 +150,12 @@ tv_status tv_corrected_pair(const tv_two_view* result, const tv_camera* camera0,
 tv_status tv_estimate_two_view(tv_context* context, const tv_camera* camera0,
                                const tv_camera* camera1, const tv_pixel_pairs* pairs,
                                const tv_estimate_options* options, tv_two_view* result,
-                               uint8_t* inlier_mask) {
+                               tv_evidence* evidence, uint8_t* inlier_mask) {
   if (context == nullptr || result == nullptr) return TV_ERR_NULL;
   tv_pixel_pairs given;
   tv_status status = tv::read_pixel_pairs(pairs, &given);
   if (status == TV_OK) status = tv::check_sized(result);
+  if (status == TV_OK && evidence != nullptr) status = tv::check_sized(evidence);
   if (status != TV_OK) return status;
   tv::PairEstimate estimate{};
   status = tv::read_estimate_options(options, camera0 != nullptr, &estimate.problem.options);
@@ -154,14 +165,15 @@ tv_status tv_estimate_two_view(tv_context* context, const tv_camera* camera0,
   }
   status = tv::check_optional_cameras(camera0, camera1);
   if (status != TV_OK) return status;
-  if (tv::arrays_overlap(given, pairs, options, camera0, camera1, result, inlier_mask)) {
+  if (tv::arrays_overlap(given, pairs, options, camera0, camera1, result, evidence, inlier_mask)) {
     return TV_ERR_OVERLAP;
   }
   tv::ArenaScope scope(context->arena);
-  tv::Evidence evidence;
-  estimate.outcome.evidence = &evidence;
+  tv::Evidence measured;
+  estimate.outcome.evidence = &measured;
   tv::estimate_pair(context, camera0, camera1, given, &estimate);
   tv::pack(estimate, result);
+  tv::pack_evidence(measured, evidence);
   if (inlier_mask != nullptr) tv::write_inliers(estimate, inlier_mask);
   return TV_OK;
 }

@@ -18,9 +18,9 @@ constexpr double kLeastGain = 50;
 
 }  // namespace
 
-void add_evidence(const tv_two_view& view, double focal_px, CameraEvidence* evidence) {
-  const double* asked = view.principal_point_asked_px;
-  const double* C = view.principal_point_asked_covariance;
+void add_evidence(const tv_evidence& of_pair, double focal_px, CameraEvidence* evidence) {
+  const double* asked = of_pair.principal_point_asked_px;
+  const double* C = of_pair.principal_point_asked_covariance;
   const double det = C[0] * C[2] - C[1] * C[1];
   const double most = kMostUncertain * focal_px, farthest = kFarthest * focal_px;
   if (!(det > 0 && C[0] + C[2] <= most * most &&

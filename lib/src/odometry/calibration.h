@@ -9,7 +9,7 @@
 namespace tv {
 
 // Adds the shift of the principal point that fits a pair's matches best, if they determine it.
-void add_evidence(const tv_two_view& view, double focal_px, CameraEvidence* evidence);
+void add_evidence(const tv_evidence& of_pair, double focal_px, CameraEvidence* evidence);
 
 // Takes the pixel `to` as the principal point from now on, and turns the keyframes from this place
 // of the map on, which were estimated with `from`, so that each sees its points where it saw them,

@@ -44,6 +44,7 @@ bool estimate_pair(Odometry* odometry, const tv_keypoint* keypoints0, const tv_k
   pair->is_inlier = arena_alloc<uint8_t>(arena, n);
   pair->view = arena_alloc<tv_two_view>(arena, 1);
   *pair->view = tv_two_view{};
+  pair->evidence = arena_alloc<tv_evidence>(arena, 1);
   if (num < kLeastMatches) return false;
   for (int32_t k = 0; k < num; ++k) {
     const tv_keypoint& a = keypoints0[matches[k].idx0];
@@ -70,8 +71,10 @@ bool estimate_pair(Odometry* odometry, const tv_keypoint* keypoints0, const tv_k
   options.max_iterations = kMostIterations;
   options.readout_turn_sigma_rad = 0;  // frames confirm each other
   tv_two_view_init(pair->view);
+  tv_evidence_init(pair->evidence);
   if (tv_estimate_two_view(odometry->context, &odometry->camera.model, &odometry->camera.model,
-                           &pairs, &options, pair->view, pair->is_inlier) != TV_OK) {
+                           &pairs, &options, pair->view, pair->evidence,
+                           pair->is_inlier) != TV_OK) {
     return false;
   }
   if (pair->view->num_still > 0) mark_still(odometry, keypoints0, keypoints1, matches, num);

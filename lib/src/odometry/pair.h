@@ -13,6 +13,7 @@ struct Pair {
   int32_t num;
   uint8_t* is_inlier;  // of each match
   tv_two_view* view;
+  tv_evidence* evidence;
 };
 
 // The keypoints as the matcher takes them.

@@ -38,7 +38,7 @@ PairArrays alloc_pair_arrays(const tv_limits& limits, Arena& arena) {
   r.more_matches = arena_alloc<tv_correspondence>(arena, n);
   r.more_inlier_mask = arena_alloc<uint8_t>(arena, m);
   r.pair = arena_alloc<tv_camera_pair>(arena, 1);
-  r.more_estimate = arena_alloc<tv_two_view>(arena, 1);
+  r.more_estimate = arena_alloc<PairResult>(arena, 1);
   // A rung has at most 6.5 times max_keypoints, and there are at least max_keypoints points.
   static_assert(sizeof(tv_point) >= 7 * sizeof *r.aligned, "the points' memory is large enough");
   r.aligned = reinterpret_cast<uint8_t*>(r.points);
@@ -54,7 +54,7 @@ size_t pair_arrays_bytes(const tv_limits& limits) {
               arena_bytes<double>(2 * m) + arena_bytes<float>(m)) +
          2 * (arena_bytes<tv_correspondence>(n) + arena_bytes<uint8_t>(m)) +
          arena_bytes<tv_point>(m) + arena_bytes<float>(m) + arena_bytes<tv_camera_pair>(1) +
-         arena_bytes<tv_two_view>(1);
+         arena_bytes<PairResult>(1);
 }
 
 tv_features features_of(const PairArrays& arrays, int view, int32_t num) {

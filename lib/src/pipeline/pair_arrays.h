@@ -3,6 +3,7 @@
 #pragma once
 
 #include "pipeline/context.h"
+#include "pipeline/pair_result.h"
 #include "twoview/reconstruct.h"
 
 namespace tv {
@@ -26,7 +27,7 @@ struct PairArrays {
   tv_point* points;
   tv_correspondence* more_matches;  // the first matches and those of guided matching together
   uint8_t* more_inlier_mask;
-  tv_two_view* more_estimate;  // the estimate from both together
+  PairResult* more_estimate;  // the estimate from both together
   // Of each keypoint of view 0, the byte that aligning its match gave (match/align.h), or 0. It
   // lies where `points` lies, and is valid until there are points.
   uint8_t* aligned;

@@ -69,10 +69,6 @@ void write_pose(const PairEstimate& estimate, tv_two_view* result) {
   if (outcome.has_covariance) {
     write_covariance(pose, inverse, outcome.covariance, swapped, result->covariance);
   }
-  result->camera_chi2 = outcome.misfit.chi2;
-  result->camera_turn_rad = outcome.misfit.turn_rad;
-  result->camera_direction_rad = outcome.misfit.direction_rad;
-  result->region_shift_rad = outcome.evidence->region_shift_rad;
   if (!outcome.evidence->has_alternative) return;
   const Pose other = swapped ? inverse_pose(outcome.alternative) : outcome.alternative;
   result->has_alternative = 1;
@@ -115,29 +111,16 @@ void write_estimate(const PairEstimate& estimate, tv_two_view* result) {
   r.struct_size = sizeof r;
   r.num_still = estimate.num_still;
   r.kind = evidence.kind;
-  r.agreement = evidence.agreement;
-  r.num_places = std::min(evidence.num_places[0], evidence.num_places[1]);
   r.num_matches = problem.num;
   r.num_inliers = evidence.num_inliers;
   r.num_iterations = estimate.model.num_iterations;
   r.seed = problem.options.seed;
-  r.essential_inliers = outcome.essential_inliers;
-  r.fundamental_inliers = outcome.fundamental_inliers;
-  r.homography_inliers = outcome.homography_inliers;
-  r.rotation_inliers = outcome.rotation_inliers;
   r.median_parallax_rad = evidence.median_parallax_rad;
   r.rms_error_px = outcome.rms_error_px;
   r.noise_px = evidence.noise_px;
   for (int k = 0; k < 2; ++k) {
     r.principal_point_shift[k] = outcome.principal_point_shift_px[k];
   }
-  if (evidence.kind == TV_KIND_CALIBRATED) {
-    const PrincipalPointTest& test = outcome.principal_point_test;
-    r.principal_point_chi2 = test.chi2;
-    std::memcpy(r.principal_point_asked_px, test.asked_px, sizeof test.asked_px);
-    std::memcpy(r.principal_point_asked_covariance, test.covariance, sizeof test.covariance);
-  }
-  r.coverage = coverage_of(evidence);
   r.focal_scale = outcome.focal_scale;
   r.focal_sigma = outcome.focal_sigma;
   if (outcome.has_covariance && !problem.one_camera) {
@@ -157,21 +140,43 @@ void write_judgement(const Judgement& judgement, tv_two_view* result) {
   result->probability_wrong = judgement.probability_wrong;
 }
 
-void keep_judgement(const tv_two_view& first, tv_two_view* again) {
-  again->verdict = first.verdict;
-  again->reasons = first.reasons;
-  again->probability_wrong = first.probability_wrong;
-  again->agreement = first.agreement;
-  again->region_shift_rad = first.region_shift_rad;
-  again->num_places = first.num_places;
-  again->camera_chi2 = first.camera_chi2;
-  again->camera_turn_rad = first.camera_turn_rad;
-  again->camera_direction_rad = first.camera_direction_rad;
-  again->principal_point_chi2 = first.principal_point_chi2;
-  std::copy(first.principal_point_asked_px, first.principal_point_asked_px + 2,
-            again->principal_point_asked_px);
-  std::copy(first.principal_point_asked_covariance, first.principal_point_asked_covariance + 3,
-            again->principal_point_asked_covariance);
+void write_evidence(const Evidence& evidence, tv_evidence* written) {
+  tv_evidence& w = *written;
+  w = tv_evidence{};
+  w.struct_size = sizeof w;
+  w.num_places = least_places(evidence);
+  w.essential_inliers = evidence.essential_inliers;
+  w.fundamental_inliers = evidence.fundamental_inliers;
+  w.homography_inliers = evidence.homography_inliers;
+  w.rotation_inliers = evidence.rotation_inliers;
+  w.coverage = coverage_of(evidence);
+  w.agreement = evidence.agreement;
+  if (evidence.kind == TV_KIND_CALIBRATED) {
+    const PrincipalPointTest& test = evidence.principal_point;
+    w.principal_point_chi2 = test.chi2;
+    std::memcpy(w.principal_point_asked_px, test.asked_px, sizeof test.asked_px);
+    std::memcpy(w.principal_point_asked_covariance, test.covariance, sizeof test.covariance);
+  }
+  if (!has_full_pose(evidence)) return;
+  w.region_shift_rad = evidence.region_shift_rad;
+  w.camera_chi2 = evidence.misfit.chi2;
+  w.camera_turn_rad = evidence.misfit.turn_rad;
+  w.camera_direction_rad = evidence.misfit.direction_rad;
+}
+
+void keep_judgement(const PairResult& first, PairResult* again) {
+  again->view.verdict = first.view.verdict;
+  again->view.reasons = first.view.reasons;
+  again->view.probability_wrong = first.view.probability_wrong;
+  const Evidence own = again->evidence;
+  Evidence& kept = again->evidence;
+  kept = first.evidence;
+  // What is no judgement: how many inliers there are now, and where.
+  kept.essential_inliers = own.essential_inliers;
+  kept.fundamental_inliers = own.fundamental_inliers;
+  kept.homography_inliers = own.homography_inliers;
+  kept.rotation_inliers = own.rotation_inliers;
+  std::copy(own.coverage, own.coverage + 2, kept.coverage);
 }
 
 void write_inliers(const PairEstimate& estimate, uint8_t* inlier_mask) {

@@ -1,14 +1,21 @@
 // What a caller is given of a pair's estimate: in the caller's order of the views, with the
-// matrices of pixels.
+// matrices of pixels; and, apart from it, what it was judged by.
 #pragma once
 
 #include "pipeline/two_view.h"
 
 namespace tv {
 
+// A result, and the evidence of its judgement.
+struct PairResult {
+  tv_two_view view;
+  Evidence evidence;
+};
+
 // Writes all of *result but its judgement, which becomes zeros.
 void write_estimate(const PairEstimate& estimate, tv_two_view* result);
 void write_judgement(const Judgement& judgement, tv_two_view* result);
+void write_evidence(const Evidence& evidence, tv_evidence* written);
 
 // Whether the result has a rotation and a translation.
 inline bool is_full_pose(const tv_two_view& result) {
@@ -16,8 +23,8 @@ inline bool is_full_pose(const tv_two_view& result) {
 }
 
 // Gives *again, an estimate that takes_guided_estimate accepts, the judgement of the first one, and
-// the measures of evidence that it is from.
-void keep_judgement(const tv_two_view& first, tv_two_view* again);
+// the evidence that it is from.
+void keep_judgement(const PairResult& first, PairResult* again);
 
 // Writes a byte for each match: 1 for an inlier, else 0.
 void write_inliers(const PairEstimate& estimate, uint8_t* inlier_mask);

@@ -23,7 +23,7 @@ int32_t num_certain(const PairArrays& arrays, int32_t num_matches) {
 // Whether more keypoints or views could give what this attempt lacks. docs/algorithms/effort.md has
 // the measurements.
 bool could_help(const PairArrays& arrays, const Attempt& attempt) {
-  const tv_two_view& e = attempt.estimate;
+  const tv_two_view& e = attempt.estimate.view;
   if (e.verdict == TV_VERDICT_OK || e.kind == TV_KIND_NO_MOTION || e.kind == TV_KIND_PANORAMIC) {
     return false;
   }
@@ -36,7 +36,7 @@ bool could_help(const PairArrays& arrays, const Attempt& attempt) {
     constexpr int32_t kFewCertain = 12;
     return attempt.rung < 2 || num_certain(arrays, attempt.num_matches) >= kFewCertain;
   }
-  return more_could_help(e);
+  return more_could_help(attempt.estimate);
 }
 
 // The rung to climb to after an attempt at `rung`. Rung 1 takes longer than rung 2 and finds less;
@@ -63,7 +63,8 @@ int32_t find_guided(tv_context* context, const PairTask& task, const Attempt& at
                     PairArrays& arrays) {
   ArenaScope scope(context->arena);
   tv_epipolar epipolar{&arrays.pair->camera0, &arrays.pair->camera1, {}};
-  std::copy(attempt.estimate.E, attempt.estimate.E + 9, epipolar.matrix);
+  const double* const E = attempt.estimate.view.E;
+  std::copy(E, E + 9, epipolar.matrix);
   const tv_correspondence* found = nullptr;
   const int32_t count =
       match_epipolar(context, epipolar, features_of(arrays, 0, attempt.num_keypoints[0]),
@@ -86,18 +87,18 @@ void match_along_lines(tv_context* context, const PairTask& task, PairArrays& ar
                          arrays.more_matches, count);
   }
   const int32_t left_out = keep_best(arrays.more_matches, context->limits.max_matches, &count);
-  tv_two_view& again = *arrays.more_estimate;
-  estimate_from(context, task, arrays.more_matches, count, arrays, attempt, &again,
+  PairResult& again = *arrays.more_estimate;
+  estimate_from(context, task, arrays.more_matches, count, arrays, attempt->num_rungs, &again,
                 arrays.more_inlier_mask);
-  write_judgement(judge(attempt->evidence), &again);
-  if (!takes_guided_estimate(attempt->estimate, again)) {
+  write_judgement(judge(again.evidence), &again.view);
+  if (!takes_guided_estimate(attempt->estimate.view, again.view)) {
     gather_pixels(arrays.matches, attempt->num_matches, task.features.keypoint_size,
                   task.options.sigma_by_size, arrays);
     return;
   }
   keep_judgement(attempt->estimate, &again);
   attempt->estimate = again;
-  keep_pair(again, task, arrays);
+  keep_pair(again.view, task, arrays);
   attempt->num_matches = count;
   attempt->num_left_out = left_out;
   std::copy(arrays.more_matches, arrays.more_matches + count, arrays.matches);
@@ -108,7 +109,7 @@ void match_along_lines(tv_context* context, const PairTask& task, PairArrays& ar
 void triangulate_inliers(tv_context* context, const PairTask& task, const Attempt& attempt,
                          PairArrays& arrays) {
   StageTimer timer(context, TV_STAGE_TRIANGULATE);
-  const bool full_pose = is_full_pose(attempt.estimate);
+  const bool full_pose = is_full_pose(attempt.estimate.view);
   if (full_pose) {
     const Camera camera0 = prepare_camera(arrays.pair->camera0);
     const Camera camera1 = prepare_camera(arrays.pair->camera1);
@@ -154,11 +155,12 @@ void adjust(tv_context* context, const PairTask& task, PairArrays& arrays, tv_tw
 
 }  // namespace
 
-bool more_could_help(const tv_two_view& pose) {
+bool more_could_help(const PairResult& pose) {
+  const Evidence& evidence = pose.evidence;
   uint32_t of_cameras = TV_REASON_LOW_PARALLAX | TV_REASON_CAMERA_CONTRADICTED;
-  if (pose.camera_direction_rad > 0) of_cameras |= TV_REASON_SECOND_MOTION;
+  if (evidence.misfit.direction_rad > 0) of_cameras |= TV_REASON_SECOND_MOTION;
   constexpr int32_t kEnoughPlaces = 20;
-  return (pose.reasons & ~of_cameras) != 0 || pose.num_places < kEnoughPlaces;
+  return (pose.view.reasons & ~of_cameras) != 0 || least_places(evidence) < kEnoughPlaces;
 }
 
 int32_t reconstruct(tv_context* context, const PairTask& task, PairArrays* arrays,
@@ -166,7 +168,7 @@ int32_t reconstruct(tv_context* context, const PairTask& task, PairArrays* array
   ArenaScope scope(context->arena);
   *arrays = alloc_pair_arrays(context->limits, context->arena);
   climb(context, task, *arrays, attempt);
-  tv_two_view& estimate = attempt->estimate;
+  tv_two_view& estimate = attempt->estimate.view;
   if (task.options.guided_matching != 0 && is_full_pose(estimate) && estimate.has_E != 0) {
     match_along_lines(context, task, *arrays, attempt);
   }

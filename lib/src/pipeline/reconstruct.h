@@ -15,6 +15,6 @@ int32_t reconstruct(tv_context* context, const PairTask& task, PairArrays* array
 // the cameras alone, in enough places, none gives; and with cameras that the matches contradict
 // some of them have a motion of their own, which more matches may only hide.
 // docs/algorithms/effort.md.
-bool more_could_help(const tv_two_view& pose);
+bool more_could_help(const PairResult& pose);
 
 }  // namespace tv

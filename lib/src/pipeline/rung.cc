@@ -92,7 +92,7 @@ bool looks_mirrored(tv_context* context, const PairTask& task, const Attempt& at
 // Adds what the descriptors are evidence for, and judges the attempt.
 void judge_attempt(tv_context* context, const PairTask& task, PairArrays& arrays,
                    Attempt* attempt) {
-  Evidence& evidence = attempt->evidence;
+  Evidence& evidence = attempt->estimate.evidence;
   const int32_t num_keypoints = std::min(attempt->num_keypoints[0], attempt->num_keypoints[1]);
   evidence.looks_repeated =
       looks_repeated(task.match, arrays.matches, arrays.inlier_mask, attempt->num_matches);
@@ -104,7 +104,7 @@ void judge_attempt(tv_context* context, const PairTask& task, PairArrays& arrays
   evidence.looks_mirrored = 4 * attempt->num_matches < num_keypoints &&
                             judge(of_pair).verdict == TV_VERDICT_OK &&
                             looks_mirrored(context, task, *attempt, arrays);
-  write_judgement(judge(evidence), &attempt->estimate);
+  write_judgement(judge(evidence), &attempt->estimate.view);
 }
 
 }  // namespace
@@ -130,20 +130,20 @@ int32_t merge_places(const PairArrays& arrays, Arena& arena, const tv_correspond
 
 // The stack is deepest here.
 void estimate_from(tv_context* context, const PairTask& task, const tv_correspondence* matches,
-                   int32_t num_matches, PairArrays& arrays, Attempt* attempt, tv_two_view* result,
+                   int32_t num_matches, PairArrays& arrays, int32_t num_rungs, PairResult* result,
                    uint8_t* inlier_mask) {
   gather_pixels(matches, num_matches, task.features.keypoint_size, task.options.sigma_by_size,
                 arrays);
   ArenaScope scope(context->arena);
-  attempt->evidence = Evidence{};
+  result->evidence = Evidence{};
   PairEstimate estimate{};
   estimate.problem.options = task.estimate;
-  estimate.outcome.evidence = &attempt->evidence;
+  estimate.outcome.evidence = &result->evidence;
   // Each rung's estimate has its chance to agree by accident.
   int32_t& num_trials = estimate.problem.options.num_trials;
-  num_trials = std::min(num_trials + attempt->num_rungs - 1, 10000);
+  num_trials = std::min(num_trials + num_rungs - 1, 10000);
   estimate_pair(context, task.views[0].camera, task.views[1].camera, arrays.pairs, &estimate);
-  write_estimate(estimate, result);
+  write_estimate(estimate, &result->view);
   write_inliers(estimate, inlier_mask);
 }
 
@@ -163,9 +163,9 @@ void run_rung(tv_context* context, const PairTask& task, PairArrays& arrays, Att
   if (!has_tilts && task.options.align_matches != 0) {
     align_found(context, task, attempt->num_matches, arrays);
   }
-  estimate_from(context, task, arrays.matches, attempt->num_matches, arrays, attempt,
+  estimate_from(context, task, arrays.matches, attempt->num_matches, arrays, attempt->num_rungs,
                 &attempt->estimate, arrays.inlier_mask);
-  keep_pair(attempt->estimate, task, arrays);
+  keep_pair(attempt->estimate.view, task, arrays);
   judge_attempt(context, task, arrays, attempt);
 }
 

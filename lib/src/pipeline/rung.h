@@ -29,8 +29,7 @@ struct Attempt {
   int32_t num_found;  // matches of descriptors
   int32_t num_matches,
       num_left_out;  // of these, what is estimated from, and those beyond the limit
-  tv_two_view estimate;
-  Evidence evidence;  // of the latest estimate
+  PairResult estimate;
 };
 
 // Runs the rung that *attempt names.
@@ -42,10 +41,10 @@ void run_rung(tv_context* context, const PairTask& task, PairArrays& arrays, Att
 int32_t merge_places(const PairArrays& arrays, Arena& arena, const tv_correspondence* first,
                      int32_t num_first, tv_correspondence* matches, int32_t num_matches);
 
-// Estimates from these matches, all but the judgement, which is zeros. Writes arrays.pairs, and the
-// evidence of *attempt.
+// Estimates from these matches, with the evidence, but without the judgement, which is zeros.
+// num_rungs: those of an Attempt. Writes arrays.pairs.
 void estimate_from(tv_context* context, const PairTask& task, const tv_correspondence* matches,
-                   int32_t num_matches, PairArrays& arrays, Attempt* attempt, tv_two_view* result,
+                   int32_t num_matches, PairArrays& arrays, int32_t num_rungs, PairResult* result,
                    uint8_t* inlier_mask);
 
 // Sets arrays.pair, for the stages that follow. Call it for each estimate that is kept.

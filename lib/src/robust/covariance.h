@@ -3,19 +3,9 @@
 #pragma once
 
 #include "robust/estimators.h"
+#include "robust/pair_evidence.h"
 
 namespace tv {
-
-// What the matches say against the cameras as they were given (camera_misfit.h).
-struct CameraMisfit {
-  double chi2 = 0;  // 0 where it was not tested
-  // By how much the pose would turn, and its direction move, with cameras that the matches do not
-  // contradict; 0 where they do not contradict the given ones.
-  double turn_rad = 0, direction_rad = 0;
-  // The largest standard deviation of the rotation about an axis before the misfit was added to the
-  // covariance; 0 where that function was not called.
-  double given_turn_sigma_rad = 0;
-};
 
 struct PoseUncertainty {
   double covariance[25];  // in the parameters (w, a, b) of PoseModel

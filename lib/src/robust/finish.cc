@@ -61,7 +61,7 @@ void take_kind(Fit& f, tv_kind kind, const Rivals& rivals) {
   switch (kind) {
     case TV_KIND_PLANAR:
       choose_planar_pose(f, rivals);
-      out.essential_inliers = f.num_support;
+      out.evidence->essential_inliers = f.num_support;
       out.has_R = out.has_t = true;
       break;
     case TV_KIND_CALIBRATED: {
@@ -118,7 +118,9 @@ void finish_two_view(TwoViewProblem& problem, const TwoViewModel& model, Arena& 
   out.epipolar = model.epipolar;
   if (out.epipolar.found) {
     refine_epipolar(f);
-    (problem.calibrated ? out.essential_inliers : out.fundamental_inliers) = f.num_support;
+    Evidence& evidence = *out.evidence;
+    (problem.calibrated ? evidence.essential_inliers : evidence.fundamental_inliers) =
+        f.num_support;
   }
   if (f.num_support < 5) {  // no epipolar model: a rival may still explain the matches
     f.num_support = f.matches.pairs.num;
@@ -128,8 +130,8 @@ void finish_two_view(TwoViewProblem& problem, const TwoViewModel& model, Arena& 
   const double least_share = out.epipolar.found ? kRivalShare : kRivalShareAlone;
   const Rivals rivals = find_rivals(matches, f.support, f.num_support, problem.calibrated,
                                     least_share, f.threshold, problem.options.seed, arena);
-  out.rotation_inliers = rivals.rotation_inliers;
-  out.homography_inliers = rivals.homography_inliers;
+  out.evidence->rotation_inliers = rivals.rotation_inliers;
+  out.evidence->homography_inliers = rivals.homography_inliers;
   if (!out.epipolar.found) f.num_support = 0;
   const int sample_size = least_matches(problem.options.method);
   const tv_kind kind = choose_kind(f, rivals, sample_size);

@@ -29,8 +29,7 @@ void store_uncertainty(const PoseUncertainty& uncertainty, TwoViewOutcome* out) 
   out->focal_sigma = uncertainty.focal_sigma;
   out->evidence->sigma_rad = uncertainty.sigma_rad;
   out->evidence->direction_sigma_rad = uncertainty.direction_sigma_rad;
-  out->evidence->misfit_direction_rad = uncertainty.misfit.direction_rad;
-  out->misfit = uncertainty.misfit;
+  out->evidence->misfit = uncertainty.misfit;
   std::copy(uncertainty.covariance, uncertainty.covariance + 25, out->covariance);
 }
 

@@ -20,13 +20,37 @@ struct Support {
   bool has_alternative = false;  // whether a second pose fits about equally well
 };
 
-// What was measured of a pair. An array of two has one entry a view.
+// What the matches say against the cameras as they were given (camera_misfit.h).
+struct CameraMisfit {
+  double chi2 = 0;  // 0 where it was not tested
+  // By how much the pose would turn, and its direction move, with cameras that the matches do not
+  // contradict; 0 where they do not contradict the given ones.
+  double turn_rad = 0, direction_rad = 0;
+  // The largest standard deviation of the rotation about an axis before the misfit was added to the
+  // covariance; 0 where that function was not called.
+  double given_turn_sigma_rad = 0;
+};
+
+// The test of a principal point that is where the calibration has it, and the shift with which the
+// matches' residuals are least (principal_point.h); zeros where they do not determine it. Pixels.
+struct PrincipalPointTest {
+  double chi2 = 0;  // of two degrees of freedom: -2 log of the probability of as much evidence
+  double asked_px[2] = {0, 0};
+  double covariance[3] = {0, 0, 0};  // of asked_px: xx, xy, yy
+};
+
+// What was measured of a pair. An array of two has one entry a view. All of it is the same when the
+// views are exchanged, but for the order of these entries.
 struct Evidence : Support {
   tv_kind kind = TV_KIND_DEGENERATE;
   int num_trials = 1;           // attempts at this pair, this one included
   double coverage[2] = {0, 0};  // share of an 8x8 grid on the image that holds an inlier
   int num_places[2] = {0, 0};   // cells of about 32 pixels that hold an inlier
   double agreement = 0;         // share of the matches that are inliers, weighted by (1 - ratio)^2
+  // The different inliers of each model; -1 where it was not estimated. They decide the kind.
+  int essential_inliers = -1, fundamental_inliers = -1, homography_inliers = -1,
+      rotation_inliers = -1;
+  PrincipalPointTest principal_point;  // of one camera that saw both views
   // Calibrated kinds but the degenerate one. Whether matches far from the pair's model have a model
   // of their own (second_model.h), and how far the points lie as on a lattice (lattice.h).
   bool has_second_model = false;
@@ -40,9 +64,7 @@ struct Evidence : Support {
   // standard deviation and alternative, a second motion of the plane.
   // The stated standard deviation of the direction, without what the calibration adds to it.
   double direction_sigma_rad = kUnknown;
-  // By how much the direction would move with cameras that the matches do not contradict; 0 where
-  // they do not contradict the given ones (camera_misfit.h).
-  double misfit_direction_rad = 0;
+  CameraMisfit misfit;
   bool is_camera_assumed = false;  // its focal length is uncertain: nobody calibrated it
   // The relative standard deviation that is left of the focal length, of two cameras the larger
   // one.
@@ -55,6 +77,10 @@ struct Evidence : Support {
   // is fitted to all of them (in rays: from a plane through the camera's centre).
   double line_distance_px[2] = {kUnknown, kUnknown};
 };
+
+inline bool has_full_pose(const Evidence& e) {
+  return e.kind == TV_KIND_CALIBRATED || e.kind == TV_KIND_PLANAR;
+}
 
 // What was measured of one camera's pose from points whose places are known.
 struct AbsoluteEvidence : Support {

@@ -20,7 +20,7 @@ void place_principal_point(Fit& f) {
   point.sigma_px[0] = sigma * camera.fx;
   point.sigma_px[1] = sigma * camera.fy;
   point.is_free =
-      principal_point_is_off(f.refiner, pose, point.sigma_px, &f.out->principal_point_test);
+      principal_point_is_off(f.refiner, pose, point.sigma_px, &f.out->evidence->principal_point);
   if (!point.is_free) return;
   const Pose as_told = pose;
   double step[2] = {1, 1};

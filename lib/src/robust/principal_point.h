@@ -13,14 +13,6 @@ struct PrincipalPoint {
   bool is_free = false;         // whether the principal point is refined with the pose
 };
 
-// The test of a principal point that is where the calibration has it, and the shift with
-// which the matches' residuals are least; zeros where they do not determine it. In pixels.
-struct PrincipalPointTest {
-  double chi2 = 0;  // of two degrees of freedom: -2 log of the probability of as much evidence
-  double asked_px[2] = {0, 0};
-  double covariance[3] = {0, 0, 0};  // of asked_px: xx, xy, yy
-};
-
 // The parameters of PoseModel, then the step of the principal point in x and y, in pixels.
 inline constexpr int kShiftedParameters = PoseModel::kParameters + 2;
 

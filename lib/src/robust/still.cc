@@ -82,7 +82,8 @@ double distance_from_arc(const Motion& motion, const double* pixel0, const doubl
 double turn_sigma(const TwoViewOutcome& outcome) {
   if (!outcome.has_t) return 0;  // that of a rotation alone is far below a pixel
   if (!outcome.has_covariance) return -1;
-  if (outcome.misfit.given_turn_sigma_rad > 0) return outcome.misfit.given_turn_sigma_rad;
+  const CameraMisfit& misfit = outcome.evidence->misfit;
+  if (misfit.given_turn_sigma_rad > 0) return misfit.given_turn_sigma_rad;
   const double* c = outcome.covariance;
   return std::sqrt(std::max(std::max(c[0], c[6]), c[12]));
 }

@@ -22,8 +22,8 @@ struct TwoViewModel {
   int num_iterations = 0;
 };
 
-// All that the entry point writes to the caller's result: models on rays, and the views in the
-// canonical order that pipeline/two_view.cc chooses.
+// All that the entry point writes to the caller's result and evidence: models on rays, and the
+// views in the canonical order that pipeline/two_view.cc chooses.
 struct TwoViewOutcome {
   Evidence* evidence = nullptr;  // what the pair is judged by, with its kind; the caller's
   EpipolarModel epipolar;
@@ -32,14 +32,10 @@ struct TwoViewOutcome {
   Mat3 H = Mat3::Zero();
   Pose alternative;
   double covariance[25] = {}, alternative_covariance[25] = {};
-  int essential_inliers = -1, fundamental_inliers = -1, homography_inliers = -1,
-      rotation_inliers = -1;
   // Models and poses refer to cameras whose principal points are shifted by this.
   double principal_point_shift_px[2] = {0, 0};
-  double focal_scale = 0;                   // of their focal lengths; 0 where they are as given
-  double focal_sigma = 0;                   // its relative standard deviation, refined or given
-  PrincipalPointTest principal_point_test;  // of a calibrated pose
-  CameraMisfit misfit;                      // of a pose that was tested
+  double focal_scale = 0;  // of their focal lengths; 0 where they are as given
+  double focal_sigma = 0;  // its relative standard deviation, refined or given
   double rms_error_px = 0;
   uint8_t* inlier = nullptr;  // one flag for each match, repeats included
 };

@@ -16,10 +16,6 @@ constexpr double kMostSigma = 1.25 * kPi / 180;
 // The probability of a wrong pose, at the least, where descriptors are evidence against it.
 constexpr double kWrongByDescriptors = 0.5;
 
-bool has_full_pose(const Evidence& e) {
-  return e.kind == TV_KIND_CALIBRATED || e.kind == TV_KIND_PLANAR;
-}
-
 bool is_refused(const Evidence& e) {
   return e.kind == TV_KIND_DEGENERATE || e.kind == TV_KIND_PANORAMIC || e.kind == TV_KIND_NO_MOTION;
 }
@@ -87,7 +83,7 @@ bool crowded_matches(const Evidence& e) {
 // any difference: what it lacks, most likely its lens, is none of those that were tried.
 bool camera_contradicted(const Evidence& e) {
   const double most_rad = e.is_camera_assumed ? 0 : 10 * kPi / 180;
-  return has_full_pose(e) && e.misfit_direction_rad > most_rad;
+  return has_full_pose(e) && e.misfit.direction_rad > most_rad;
 }
 
 // The points lie as on a lattice: of the neighbours of a point, more have another point opposite
@@ -141,6 +137,8 @@ tv_verdict verdict_of(bool refused, uint32_t reasons) {
 }  // namespace
 
 double coverage_of(const Evidence& e) { return std::max(e.coverage[0], e.coverage[1]); }
+
+int least_places(const Evidence& e) { return std::min(e.num_places[0], e.num_places[1]); }
 
 // Refused: the kind is degenerate, a pure rotation or no motion, so the caller has no translation
 // to use. Ok: there is no reason. Doubtful: there is at least one. A full pose that is too probably

@@ -21,6 +21,9 @@ Judgement judge(const AbsoluteEvidence& evidence);
 // The coverage that is reported and judged: the larger of the two views'.
 double coverage_of(const Evidence& evidence);
 
+// How many places hold an inlier, in the view where fewer do.
+int least_places(const Evidence& evidence);
+
 // Whether the geometry of the estimate with the matches of guided matching replaces that of the
 // first one. Each has the verdict that it has by itself; that of the first one, and the measures
 // that it is from, stay.

@@ -162,7 +162,8 @@ class FilmPairs {
     options.focal_sigma0 = options.focal_sigma1 = kPriorLogFocal;
     options.max_iterations = 1000;
     tv_two_view_init(found);
-    check(tv_estimate_two_view(session_.get(), &camera, &camera, &pixels, &options, found, nullptr),
+    check(tv_estimate_two_view(session_.get(), &camera, &camera, &pixels, &options, found, nullptr,
+                               nullptr),
           "cannot estimate the focal length");
   }
 

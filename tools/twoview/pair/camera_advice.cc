@@ -43,11 +43,11 @@ CameraAdvice advice_for(const tv_camera& camera, const std::vector<ShiftEvidence
 
 }  // namespace
 
-std::optional<ShiftEvidence> shift_evidence(const tv_two_view& result, const tv_camera& camera) {
-  if (!(result.principal_point_asked_covariance[0] > 0)) return std::nullopt;
+std::optional<ShiftEvidence> shift_evidence(const tv_evidence& of_pair, const tv_camera& camera) {
+  if (!(of_pair.principal_point_asked_covariance[0] > 0)) return std::nullopt;
   return ShiftEvidence{camera,
-                       result.principal_point_chi2,
-                       {result.principal_point_asked_px[0], result.principal_point_asked_px[1]}};
+                       of_pair.principal_point_chi2,
+                       {of_pair.principal_point_asked_px[0], of_pair.principal_point_asked_px[1]}};
 }
 
 std::vector<CameraAdvice> advise(const std::vector<ShiftEvidence>& pairs) {

@@ -9,14 +9,14 @@
 
 namespace cli {
 
-// What one pair says (tv_two_view.principal_point_chi2).
+// What one pair says (tv_evidence.principal_point_chi2).
 struct ShiftEvidence {
   tv_camera camera;  // of both views
   double chi2, asked_px[2];
 };
 
-// The evidence of a result, empty where it is not known.
-std::optional<ShiftEvidence> shift_evidence(const tv_two_view& result, const tv_camera& camera);
+// What a pair's evidence says of its one camera, empty where it is not known.
+std::optional<ShiftEvidence> shift_evidence(const tv_evidence& of_pair, const tv_camera& camera);
 
 struct CameraAdvice {
   tv_camera camera;

@@ -168,10 +168,12 @@ uint64_t estimate_own_matches(Session& session, const Options& options, const Ma
   tv_pixel_pairs pairs = pixel_pairs(matches.pixels);
   pairs.ratios = matches.ratios.empty() ? nullptr : matches.ratios.data();
   tv_two_view_init(&outcome.two_view);
+  tv_evidence_init(&outcome.evidence);
   const uint64_t start_ns = now_ns();
   check(tv_estimate_two_view(context, outcome.has_cameras ? &outcome.camera[0] : nullptr,
                              outcome.has_cameras ? &outcome.camera[1] : nullptr, &pairs,
-                             &options.estimate, &outcome.two_view, outcome.own.inlier_mask.data()),
+                             &options.estimate, &outcome.two_view, &outcome.evidence,
+                             outcome.own.inlier_mask.data()),
         "cannot estimate with --method " + method_name(options.estimate.method));
   if (has_full_pose(outcome.two_view)) triangulate(options, matches, outcome);
   return now_ns() - start_ns;

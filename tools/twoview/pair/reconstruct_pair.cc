@@ -19,6 +19,7 @@ uint64_t reconstruct_pair(Session& session, const Options& options, Outcome& out
     views[i].camera = outcome.has_cameras ? &outcome.camera[i] : nullptr;
   }
   tv_two_view_init(&outcome.two_view);
+  tv_evidence_init(&outcome.evidence);
   tv_reconstruction_init(&outcome.reconstruction);
   tv_reconstruct_options stages;
   tv_reconstruct_options_init(&stages);
@@ -35,7 +36,7 @@ uint64_t reconstruct_pair(Session& session, const Options& options, Outcome& out
   stages.estimate = &options.estimate;
   const uint64_t start_ns = now_ns();
   const tv_status status = tv_reconstruct(context, &views[0], &views[1], &stages, &outcome.two_view,
-                                          &outcome.reconstruction);
+                                          &outcome.evidence, &outcome.reconstruction);
   const uint64_t total_ns = now_ns() - start_ns;
   if (status != TV_OK)
     throw BadInput("cannot reconstruct " + p0.path + " and " + p1.path + " with --method " +

@@ -274,19 +274,20 @@ Json covariance_json(const tv_two_view& v) {
   return numbers_or_null(v.covariance, 25, v.has_covariance);
 }
 
-Json principal_point_json(const tv_two_view& v) {
-  const bool known = v.principal_point_asked_covariance[0] > 0;
-  return {{"chi2", known ? finite_or_null(v.principal_point_chi2) : Json(nullptr)},
-          {"asked_px", numbers_or_null(v.principal_point_asked_px, 2, known)},
-          {"asked_covariance_px2", numbers_or_null(v.principal_point_asked_covariance, 3, known)},
-          {"shift_px", numbers_or_null(v.principal_point_shift, 2, true)}};
+Json principal_point_json(const Outcome& outcome) {
+  const tv_evidence& e = outcome.evidence;
+  const bool known = e.principal_point_asked_covariance[0] > 0;
+  return {{"chi2", known ? finite_or_null(e.principal_point_chi2) : Json(nullptr)},
+          {"asked_px", numbers_or_null(e.principal_point_asked_px, 2, known)},
+          {"asked_covariance_px2", numbers_or_null(e.principal_point_asked_covariance, 3, known)},
+          {"shift_px", numbers_or_null(outcome.two_view.principal_point_shift, 2, true)}};
 }
 
-Json camera_misfit_json(const tv_two_view& v) {
-  if (!(v.camera_chi2 > 0)) return nullptr;
-  return {{"chi2", finite_or_null(v.camera_chi2)},
-          {"rotation_deg", finite_or_null(v.camera_turn_rad * kDegrees)},
-          {"direction_deg", finite_or_null(v.camera_direction_rad * kDegrees)}};
+Json camera_misfit_json(const tv_evidence& e) {
+  if (!(e.camera_chi2 > 0)) return nullptr;
+  return {{"chi2", finite_or_null(e.camera_chi2)},
+          {"rotation_deg", finite_or_null(e.camera_turn_rad * kDegrees)},
+          {"direction_deg", finite_or_null(e.camera_direction_rad * kDegrees)}};
 }
 
 bool focal_length_is_uncertain(const tv_two_view& v) { return v.focal_sigma > 0.02; }
@@ -346,18 +347,19 @@ Json result_json(const Outcome& outcome) {
                            {"t", numbers_or_null(other_t, 3, true)},
                            {"covariance", numbers_or_null(v.alternative_covariance, 25,
                                                           v.has_alternative_covariance)}};
-  json["evidence"] = {{"essential", count_or_null(v.essential_inliers)},
-                      {"fundamental", count_or_null(v.fundamental_inliers)},
-                      {"homography", count_or_null(v.homography_inliers)},
-                      {"rotation", count_or_null(v.rotation_inliers)},
-                      {"coverage", finite_or_null(v.coverage)}};
+  const tv_evidence& e = outcome.evidence;
+  json["evidence"] = {{"essential", count_or_null(e.essential_inliers)},
+                      {"fundamental", count_or_null(e.fundamental_inliers)},
+                      {"homography", count_or_null(e.homography_inliers)},
+                      {"rotation", count_or_null(e.rotation_inliers)},
+                      {"coverage", finite_or_null(e.coverage)}};
   json["covariance"] = covariance_json(v);
   json["noise_px"] = v.noise_px > 0 ? finite_or_null(v.noise_px) : Json(nullptr);
   json["principal_point_shift_px"] =
       numbers_or_null(v.principal_point_shift, 2, outcome.has_cameras);
-  json["principal_point"] = outcome.has_cameras ? principal_point_json(v) : Json(nullptr);
+  json["principal_point"] = outcome.has_cameras ? principal_point_json(outcome) : Json(nullptr);
   json["focal_length"] = focal_length_json(v);
-  json["camera_misfit"] = camera_misfit_json(v);
+  json["camera_misfit"] = camera_misfit_json(e);
   const double scale = magnification(outcome);
   json["magnification"] = scale > 0 ? finite_or_null(scale) : Json(nullptr);
   json["num_points"] = r.num_points;

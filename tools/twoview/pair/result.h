@@ -39,6 +39,7 @@ struct Outcome {
   // The cameras of the images as used: those of the camera files, scaled if the image was resized.
   tv_camera camera[2]{};
   tv_two_view two_view{};
+  tv_evidence evidence{};
   // Its arrays are in the context's memory until its next call, or in `own`.
   tv_reconstruction reconstruction{};
   OwnArrays own;
@@ -92,7 +93,7 @@ nlohmann::ordered_json rungs_json(const tv_reconstruction& reconstruction);
 
 // The test of the principal point: `chi2`, `asked_px`, `asked_covariance_px2` (null where it is not
 // known) and `shift_px`.
-nlohmann::ordered_json principal_point_json(const tv_two_view& two_view);
+nlohmann::ordered_json principal_point_json(const Outcome& outcome);
 
 // The verdict for people: the word "ok" only where there is a full pose. A fundamental matrix alone
 // that is to be believed is "matches ok, no pose".
@@ -112,7 +113,7 @@ double focal_change_percent(const tv_two_view& two_view);
 
 // What the matches say against the cameras as they were given: `chi2`, and by how much the pose
 // would move, `rotation_deg` and `direction_deg`; null where it was not tested.
-nlohmann::ordered_json camera_misfit_json(const tv_two_view& two_view);
+nlohmann::ordered_json camera_misfit_json(const tv_evidence& evidence);
 
 // `scale` (1 where it is as given), `sigma` and `uncertain` of the focal length; null where it is
 // taken as exact.

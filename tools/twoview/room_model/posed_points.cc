@@ -93,7 +93,7 @@ void PosedPoints::confirm(const Pairs& pairs) {
   tv_two_view_init(&found);
   std::vector<uint8_t> is_inlier(pairs.size());
   check(tv_estimate_two_view(session_.get(), &scene_.camera, &scene_.camera, &given,
-                             &options_.estimate, &found, is_inlier.data()),
+                             &options_.estimate, &found, nullptr, is_inlier.data()),
         "cannot estimate");
   if (found.verdict != TV_VERDICT_OK) return;
   Pairs inliers{{pairs.views[0], pairs.views[1]}, {}};

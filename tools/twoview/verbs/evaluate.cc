@@ -206,9 +206,9 @@ PairReport evaluate_pair(Arguments& a, const Cameras& cameras, const Pair& pair,
     json["probability_wrong"] = v.probability_wrong;
     json["covariance"] = covariance_json(v);
     json["principal_point_shift_px"] = v.principal_point_shift;
-    json["principal_point"] = principal_point_json(v);
-    json["camera_misfit"] = camera_misfit_json(v);
-    report.shift = shift_evidence(v, outcome.camera[0]);
+    json["principal_point"] = principal_point_json(outcome);
+    json["camera_misfit"] = camera_misfit_json(outcome.evidence);
+    report.shift = shift_evidence(outcome.evidence, outcome.camera[0]);
     json["effort"] = outcome.reconstruction.effort;
     json["timings_ms"] = {{"rungs", rungs_json(outcome.reconstruction)}};
     json["time_ms"] = static_cast<double>(total_ns) * 1e-6;

@@ -193,7 +193,7 @@ std::optional<Pose3> free_pose(const Arguments& a, const tv_pixel_pairs& pixels,
   tv_two_view_init(&found);
   std::vector<uint8_t> is_inlier(static_cast<size_t>(pixels.num));
   check(tv_estimate_two_view(context, &camera0, &camera1, &pixels, &a.common.options.estimate,
-                             &found, is_inlier.data()),
+                             &found, nullptr, is_inlier.data()),
         "cannot estimate");
   if (!has_full_pose(found)) return {};
   return Pose3{rotation_of(found), translation_of(found)};

@@ -194,8 +194,9 @@ def _plain(values):
 
 
 def row_of_result(result):
-    """tv_two_view as a dict for JSON; what was not estimated is None."""
+    """tv_two_view and its evidence as a dict for JSON; what was not estimated is None."""
     name = twoview_ctypes.enum_name
+    evidence = result.evidence
     row = {"config": name("kind", result.kind), "verdict": name("verdict", result.verdict),
            "reasons": [r.name.lower() for r in twoview_ctypes.enums.Reason
                        if r & result.reasons],
@@ -208,20 +209,21 @@ def row_of_result(result):
                       .replace("alternative_t", "alternative"))
         row[field] = _plain(getattr(result, field)) if has else None
     for model in ("essential", "fundamental", "homography", "rotation"):
-        count = getattr(result, model + "_inliers")
+        count = getattr(evidence, model + "_inliers")
         row[model + "_inliers"] = count if count >= 0 else None
-    asked = result.principal_point_asked_covariance[0] > 0
-    row.update({"coverage": result.coverage,
+    asked = evidence.principal_point_asked_covariance[0] > 0
+    row.update({"coverage": evidence.coverage,
                 "median_parallax_deg": float(np.degrees(result.median_parallax_rad)),
                 "rms_error_px": result.rms_error_px, "noise_px": result.noise_px,
-                "principal_point_chi2": result.principal_point_chi2 if asked else None,
+                "probability_wrong": result.probability_wrong,
+                "principal_point_chi2": evidence.principal_point_chi2 if asked else None,
                 "principal_point_asked_px":
-                    _plain(result.principal_point_asked_px) if asked else None,
+                    _plain(evidence.principal_point_asked_px) if asked else None,
                 "principal_point_asked_covariance":
-                    _plain(result.principal_point_asked_covariance) if asked else None})
-    for field in ("probability_wrong", "agreement", "region_shift_rad", "num_places",
+                    _plain(evidence.principal_point_asked_covariance) if asked else None})
+    for field in ("agreement", "region_shift_rad", "num_places",
                   "camera_chi2", "camera_turn_rad", "camera_direction_rad"):
-        row[field] = getattr(result, field)
+        row[field] = getattr(evidence, field)
     return row
 
 

@@ -90,7 +90,7 @@ TV_API tv_status tv_depth_map_camera(const tv_camera *reference, const tv_depth_
                                      tv_camera *map_camera);
 
 /* Writes to *size_bytes how much memory tv_sweep_depth needs for this reference and these options:
-   about 31 MB for the defaults and an image of 640 x 480. Statuses as tv_depth_map_camera. */
+   75 MiB for the defaults and an image of 640 x 480. Statuses as tv_depth_map_camera. */
 TV_API tv_status tv_depth_size(const tv_camera *reference, const tv_depth_options *options,
                                size_t *size_bytes);
 

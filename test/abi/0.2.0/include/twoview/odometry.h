@@ -320,7 +320,8 @@ TV_API tv_status tv_odometry_finish(tv_odometry *odometry);
    keyframe whose surroundings are searched first; -1: no such hint. state: as for
    tv_odometry_track; its status is TV_ODOMETRY_TRACKING, TV_ODOMETRY_WEAK or TV_ODOMETRY_LOST, and
    its scale that of the segment which is tracked. The frames that follow are tracked as if this one
-   had not been looked for.
+   had not been looked for. Places may look alike, as on a wall with a pattern: where the frame has
+   neighbours, the caller compares their poses with this one.
    Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_CAMERA, TV_ERR_STRIDE, TV_ERR_MASK,
    TV_ERR_OVERLAP. */
 TV_API tv_status tv_odometry_locate(tv_odometry *odometry, const tv_image *image,

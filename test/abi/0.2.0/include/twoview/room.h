@@ -311,10 +311,10 @@ TV_API void tv_room_plane_options_init_sized(tv_room_plane_options *options, siz
 
 /* Finds the planes of the measured surface, the largest first: the one of 256 candidates, the
    surfaces of blocks, that most of the surface lies on, within 1.5 voxels and 20 degrees, then
-   refined by least squares; and again among what is left.
+   refined by least squares, on its largest connected part first; and again among what is left.
    options: null means the defaults. planes: room for cap_planes, [0, TV_ROOM_MAX_PLANES].
    *num_planes: how many were written. The room is only read, but for scratch in its memory. Takes
-   a step for each voxel of the room, and for each plane a million at most.
+   a step for each voxel of the room, and for each plane some millions.
    Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (an option, the capacity),
    TV_ERR_NOT_FINITE (an option), TV_ERR_OVERLAP. */
 TV_API tv_status tv_room_find_planes(tv_room *room, const tv_room_plane_options *options,

@@ -100,7 +100,8 @@ typedef enum tv_reason {
   /* The direction of t is poorly determined: the median parallax is below 3 max_error_px or below
      10 times the noise, or the largest standard deviation of the pose exceeds 1.25 degrees by the
      noise alone, or that of the direction 13.5 degrees with the errors that matches share. With two
-     cameras of uncertain focal length (above 0.02), with all that the covariance states. */
+     cameras of uncertain focal length (above 0.02), with all that the covariance states. Or the
+     relative standard deviation that is left of the focal length exceeds 0.125. */
   TV_REASON_LOW_PARALLAX = 1 << 2,
   /* The matches lie on a plane, and two different poses explain them equally well. Both are in the
      result. */
@@ -125,7 +126,8 @@ typedef enum tv_reason {
   /* The matches contradict the cameras as they were given: the rows of a picture were exposed one
      after another while the camera turned (a rolling shutter), or its principal point or lens is
      another one. With cameras that the matches do not contradict, the direction would be another
-     one by more than 10 degrees (camera_direction_rad). */
+     one by more than 10 degrees (tv_evidence.camera_direction_rad), or, where the focal length is
+     uncertain (above 0.02), by anything: such a camera is assumed, and so is its lens. */
   TV_REASON_CAMERA_CONTRADICTED = 1 << 9
 } tv_reason;
 
@@ -188,11 +190,12 @@ typedef struct tv_estimate_options {
   double center_sigma0, center_sigma1;
   /* How far a camera may turn while the sensor reads the rows of a picture, one after another: the
      standard deviation about each axis, in radians, [0, 0.5]; default 0.02, which is 50 degrees a
-     second in 23 ms. Where the matches contradict cameras that stood still (camera_chi2), the
-     covariance grows by what such a turn, and another principal point, make of the pose, and a pose
-     that would be another one is given TV_REASON_CAMERA_CONTRADICTED. Nothing is corrected. The
-     rows are those of the image as given: of a picture that was turned since, or of a sensor that
-     exposes all rows at once (global shutter), 0 may be stated, which leaves the test out. */
+     second in 23 ms. Where the matches contradict cameras that stood still
+     (tv_evidence.camera_chi2), the covariance grows by what such a turn, and another principal
+     point, make of the pose, and a pose that would be another one is given
+     TV_REASON_CAMERA_CONTRADICTED. Nothing is corrected. The rows are those of the image as given:
+     of a picture that was turned since, or of a sensor that exposes all rows at once (global
+     shutter), 0 may be stated, which leaves the test out. */
   double readout_turn_sigma_rad;
   /* Which attempt at these two images this is, [0, 10000]; 0 (default) means the first. Whoever
      tries again until the verdict is "ok" gives accident as many chances as there are attempts: the
@@ -210,8 +213,8 @@ TV_API void tv_estimate_options_init_sized(tv_estimate_options *options, size_t 
 #define tv_estimate_options_init(options) \
   tv_estimate_options_init_sized((options), sizeof *(options))
 
-/* The result of an estimate. Matrices are row-major. A matrix or vector whose has_ flag is 0 holds
-   zeros. */
+/* The result of an estimate: what a program acts on. What it was decided from is in tv_evidence.
+   Matrices are row-major. A matrix or vector whose has_ flag is 0 holds zeros. */
 typedef struct tv_two_view {
   /* The caller's sizeof, set by tv_two_view_init. */
   uint32_t struct_size;
@@ -230,6 +233,13 @@ typedef struct tv_two_view {
       has_alternative_covariance;
   /* How many samples were drawn. */
   int32_t num_iterations;
+  /* How many of the matches stand still: they keep their pixel, to within twice max_error_px (times
+     the sigma) and at least 2 pixels, while the rest of the picture moves, and no point of the
+     scene can be there at any distance: on-screen text, a frame, a watermark, the vehicle's own
+     legs. They are left out of the estimate and are no inliers. 0 where there are none, without
+     cameras, and where the images differ in size. docs/algorithms/two_view.md, what stands still.
+   */
+  int32_t num_still;
   /* The pose cam1_from_cam0: x1 = R x0 + t, where R is a rotation matrix and |t| = 1. */
   double R[9], t[3];
   /* The essential matrix [t]x R, scaled to Frobenius norm 1. */
@@ -250,12 +260,6 @@ typedef struct tv_two_view {
   double covariance[25];
   /* The covariance of the alternative pose, in radians^2 and in the same parameters. */
   double alternative_covariance[25];
-  /* How many inliers each model has, repeated matches counted once; -1 where that model was not
-     estimated. */
-  int32_t essential_inliers, fundamental_inliers, homography_inliers, rotation_inliers;
-  /* The share of the cells of an 8x8 grid over an image that hold an inlier, [0, 1]: the larger of
-     the two images' shares. */
-  double coverage;
   /* The median, over the inliers, of the angle in radians between the two rays of a match after the
      rotation was removed; 0 without a full pose. */
   double median_parallax_rad;
@@ -273,6 +277,54 @@ typedef struct tv_two_view {
      principal_point_sigma is above 0. All of the result refers to the cameras with it, which
      tv_corrected_pair computes. */
   double principal_point_shift[2];
+  /* The probability that the pose is wrong, [0, 1]. It is calibrated on real pairs for one event:
+     the rotation is off by more than 5 degrees (docs/verdict.md has the figures). The direction is
+     wrong more often; the covariance says how uncertain both are where the pose is right. 1 where
+     there is no full pose R and t: without cameras, and for the kinds degenerate, panoramic and
+     no-motion. It is at least 0.5 where tv_reconstruct finds a reason in the descriptors: a
+     mirrored image, or a second place that looks the same. What it is computed from is in
+     tv_evidence, with noise_px and has_alternative. */
+  double probability_wrong;
+  /* The factor, without a unit, by which the estimate multiplies fx and fy of both cameras, where
+     the focal length was refined with the pose (focal_sigma0): all of the result refers to the
+     cameras with it, which tv_corrected_pair computes. 0 where the focal length is as given. */
+  double focal_scale;
+  /* The relative standard deviation of the focal length (of camera0's, where the cameras differ)
+     that the covariance contains: what the matches leave of focal_sigma0 where it was refined, else
+     focal_sigma0 as given. 0 where it is taken as exact, or there is no covariance. Bundle
+     adjustment in tv_reconstruct leaves it as it is, though its covariance takes the cameras as
+     exact. */
+  double focal_sigma;
+} tv_two_view;
+
+/* Writes zeros into a struct of struct_size bytes, and the size; null is allowed. Programs call
+   tv_two_view_init. */
+TV_API void tv_two_view_init_sized(tv_two_view *result, size_t struct_size);
+/* Writes zeros, and struct_size; null is allowed. */
+#define tv_two_view_init(result) tv_two_view_init_sized((result), sizeof *(result))
+
+/* What kind, verdict and probability_wrong of a result were decided from, for whoever wants to know
+   why: diagnostics, statistics over many pairs, other thresholds. It is the same for swapped
+   images. The functions that take it write it where it is asked for, and decide nothing by that. */
+typedef struct tv_evidence {
+  /* The caller's sizeof, set by tv_evidence_init. */
+  uint32_t struct_size;
+  /* How many cells of 32 pixels hold an inlier, in the image where fewer do (at most 64 cells, at
+     least 16, along the longer side). */
+  int32_t num_places;
+  /* How many inliers each model has, repeated matches counted once; -1 where that model was not
+     estimated. */
+  int32_t essential_inliers, fundamental_inliers, homography_inliers, rotation_inliers;
+  /* The share of the cells of an 8x8 grid over an image that hold an inlier, [0, 1]: the larger of
+     the two images' shares. */
+  double coverage;
+  /* The share of the different matches that are inliers, each weighted by (1 - ratio)^2, [0, 1]:
+     the matches with the most certain descriptors count most. */
+  double agreement;
+  /* By how many radians the rotation turns, to first order, when the inliers of one sixteenth of an
+     image are left out: of the part that turns it most, the mean of both images; [0, pi]. 0 without
+     a full pose. */
+  double region_shift_rad;
   /* Evidence against (cx, cy) as they were given, whatever principal_point_sigma is: chi-square
      with two degrees of freedom where they are right, so that it exceeds 13.8 in one pair of a
      thousand. This field and the next two are 0 where the evidence is not known: where camera0 and
@@ -285,41 +337,6 @@ typedef struct tv_two_view {
   double principal_point_asked_px[2];
   /* The covariance of principal_point_asked_px, in pixels^2: of x, of x and y, of y. */
   double principal_point_asked_covariance[3];
-  /* The probability that the pose is wrong, [0, 1]. It is calibrated on real pairs for one event:
-     the rotation is off by more than 5 degrees (docs/verdict.md has the figures). The direction is
-     wrong more often; the covariance says how uncertain both are where the pose is right. 1 where
-     there is no full pose R and t: without cameras, and for the kinds degenerate, panoramic and
-     no-motion. It is at least 0.5 where tv_reconstruct finds a reason in the descriptors: a
-     mirrored image, or a second place that looks the same. The next three fields are the evidence
-     that it is computed from, with noise_px and has_alternative. */
-  double probability_wrong;
-  /* The share of the different matches that are inliers, each weighted by (1 - ratio)^2, [0, 1]:
-     the matches with the most certain descriptors count most. */
-  double agreement;
-  /* By how many radians the rotation turns, to first order, when the inliers of one sixteenth of an
-     image are left out: of the part that turns it most, the mean of both images; [0, pi]. 0 without
-     a full pose. */
-  double region_shift_rad;
-  /* How many cells of 32 pixels hold an inlier, in the image where fewer do (at most 64 cells, at
-     least 16, along the longer side). */
-  int32_t num_places;
-  /* How many of the matches stand still: they keep their pixel, to within twice max_error_px (times
-     the sigma) and at least 2 pixels, while the rest of the picture moves, and no point of the
-     scene can be there at any distance: on-screen text, a frame, a watermark, the vehicle's own
-     legs. They are left out of the estimate and are no inliers. 0 where there are none, without
-     cameras, and where the images differ in size. docs/algorithms/two_view.md, what stands still.
-   */
-  int32_t num_still;
-  /* The factor, without a unit, by which the estimate multiplies fx and fy of both cameras, where
-     the focal length was refined with the pose (focal_sigma0): all of the result refers to the
-     cameras with it, which tv_corrected_pair computes. 0 where the focal length is as given. */
-  double focal_scale;
-  /* The relative standard deviation of the focal length (of camera0's, where the cameras differ)
-     that the covariance contains: what the matches leave of focal_sigma0 where it was refined, else
-     focal_sigma0 as given. 0 where it is taken as exact, or there is no covariance. Bundle
-     adjustment in tv_reconstruct leaves it as it is, though its covariance takes the cameras as
-     exact. */
-  double focal_sigma;
   /* Evidence of the matches against the cameras as they were given (readout_turn_sigma_rad), or 0
      where it was not tested: where there is no pose, or it was fitted together with a plane that
      explains nearly all matches. Above 26.1 (22.5 where camera0 and camera1 differ) the cameras
@@ -331,13 +348,13 @@ typedef struct tv_two_view {
   double camera_turn_rad;
   /* The same of the direction (of t or of the inverse pose's, whichever moves more). */
   double camera_direction_rad;
-} tv_two_view;
+} tv_evidence;
 
 /* Writes zeros into a struct of struct_size bytes, and the size; null is allowed. Programs call
-   tv_two_view_init. */
-TV_API void tv_two_view_init_sized(tv_two_view *result, size_t struct_size);
+   tv_evidence_init. */
+TV_API void tv_evidence_init_sized(tv_evidence *evidence, size_t struct_size);
 /* Writes zeros, and struct_size; null is allowed. */
-#define tv_two_view_init(result) tv_two_view_init_sized((result), sizeof *(result))
+#define tv_evidence_init(evidence) tv_evidence_init_sized((evidence), sizeof *(evidence))
 
 /* Writes to *pair the cameras and the motion that the result refers to, for what follows the
    estimate: triangulation, guided matching, bundle adjustment and the dense cloud. Each camera is
@@ -360,6 +377,7 @@ TV_API tv_status tv_corrected_pair(const tv_two_view *result, const tv_camera *c
    result: initialised by tv_two_view_init. That no geometry was found is TV_OK, and reported in
    kind, verdict and reasons. With both views exchanged, R is the transpose bit for bit, and t is
    -R^T t.
+   evidence: null, or initialised by tv_evidence_init.
    inlier_mask: null, or room for pairs->num bytes; a byte is 1 where the match is an inlier of the
    model that the kind names.
    Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS, TV_ERR_CAMERA,
@@ -371,7 +389,7 @@ TV_API tv_status tv_corrected_pair(const tv_two_view *result, const tv_camera *c
 TV_API tv_status tv_estimate_two_view(tv_context *context, const tv_camera *camera0,
                                       const tv_camera *camera1, const tv_pixel_pairs *pairs,
                                       const tv_estimate_options *options, tv_two_view *result,
-                                      uint8_t *inlier_mask);
+                                      tv_evidence *evidence, uint8_t *inlier_mask);
 
 TV_END_DECLS
 
