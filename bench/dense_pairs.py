@@ -243,6 +243,7 @@ class Densifier:
         self.options = library.make(_abi.tv_dense_options)
         self.options.max_cells = 1 << 20
         self.options.max_steps = 256
+        self.options.max_relative_sigma = 1  # OpenCV leaves out nothing for it
         t = np.array([-1.0, 0, 0])
         self.cameras_and_motion = _abi.camera_pair(*self.cameras, np.eye(3), t)
         # The points of the truth at every 40th pixel stand for the sparse points of the pair.
