@@ -83,6 +83,7 @@ def test_a_room_that_is_full_says_so_and_goes_on_coarser():
         assert room.state.voxel == 2 * state.voxel and room.state.num_blocks < state.num_blocks
         add(room, 1.0 + 0.3 * state.num_maps)
         assert len(room.mesh().vertices) > before / 4
+        assert room.prune() > 0 and not len(room.mesh().vertices)  # none was seen twice
 
 
 def test_a_plain_wall_is_inferred_from_its_edges():

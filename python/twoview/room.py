@@ -113,7 +113,8 @@ class Room:
                     witnesses: Optional[np.ndarray] = None,
                     pixels: Optional[np.ndarray] = None, *,
                     mask: Optional[np.ndarray] = None) -> None:
-        """tv_room_see_through: lets a map that is in the room see through what was added after it.
+        """tv_room_see_through: adds a map that is in the room to the blocks that were made after
+        it: it sees through them, and takes back what prune freed of its surface.
         Raises TV_ERR_ARGUMENT where the room holds no such map."""
         self._fuse("tv_room_see_through", camera, R, t, distance, sigma, witnesses, pixels, mask,
                    False)
@@ -155,6 +156,13 @@ class Room:
                    _abi.pointer(inferred[0]), _abi.pointer(inferred[1]), byref(count))
         del kept
         return inferred[0], inferred[1]
+
+    def prune(self, min_maps: int = 2) -> int:
+        """tv_room_prune: frees the memory of what fewer than min_maps maps measured; how many
+        blocks that was."""
+        freed = c_int32()
+        self._call("tv_room_prune", c_int32(min_maps), byref(freed))
+        return freed.value
 
     def coarsen(self) -> None:
         """tv_room_coarsen: doubles the voxel, which leaves about three quarters of the memory

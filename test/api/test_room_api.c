@@ -240,6 +240,17 @@ static void test_a_room_holds_its_limit_of_maps(void) {
   TEST_ASSERT_EQUAL_INT(0, num_vertices);
 }
 
+static void test_prune_refuses(void) {
+  int32_t freed = -1;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_room_prune(NULL, 2, &freed));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_room_prune(room, 0, &freed));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_room_prune(room, 256, &freed));
+  TEST_ASSERT_EQUAL_INT(-1, freed);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_room_prune(room, 255, &freed));
+  TEST_ASSERT_EQUAL_INT(0, freed);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_room_prune(room, 1, NULL));
+}
+
 static void test_a_room_is_coarsened_sixteen_times(void) {
   int k;
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_room_coarsen(NULL));
@@ -510,6 +521,7 @@ int main(void) {
   RUN_TEST(test_a_map_is_refused);
   RUN_TEST(test_what_is_not_in_the_room_is_not_removed);
   RUN_TEST(test_a_room_holds_its_limit_of_maps);
+  RUN_TEST(test_prune_refuses);
   RUN_TEST(test_a_room_is_coarsened_sixteen_times);
   RUN_TEST(test_a_state_is_written_as_far_as_its_size);
   RUN_TEST(test_a_mesh_is_refused);

@@ -690,6 +690,9 @@ class RoomTest(CliTest):
         # that have doubled: twice the memory is enough for half the voxel.
         self.succeed(self.room("--voxel", "0.02", "--max-memory", "2"))
         self.assertLessEqual(self.result()["room"]["voxel"], room["voxel"] / 2)
+        # What one keyframe alone saw makes way: 0.32 without that.
+        self.succeed(self.room("--voxel", "0.08", "--max-memory", "8"))
+        self.assertEqual(self.result()["room"]["voxel"], 0.16)
 
     # -- bad input ----------------------------------------------------------------------------
 

@@ -143,6 +143,7 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       if (status == TV_OK) held.push_back(std::move(m));
     } else if (kind == 4 && !held.empty()) {
       const tv_depth_map map = given(held.back());
+      if (held.size() % 2 == 0) tv_room_prune(room, 2, nullptr);
       tv_room_see_through(room, &map);
       tv_room_remove(room, &map);
       held.pop_back();

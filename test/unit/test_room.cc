@@ -351,6 +351,61 @@ void test_a_room_that_is_full_keeps_what_it_has_and_goes_on_coarser() {
   TEST_ASSERT_EQUAL(TV_OK, remove(room, maps[23]));
 }
 
+bool is_before(const tv_room_vertex& a, const tv_room_vertex& b) {
+  return std::memcmp(&a, &b, sizeof a) < 0;
+}
+
+// The vertices of the surface that two maps confirm, in an order that blocks do not decide.
+std::vector<tv_room_vertex> confirmed(tv_room* room) {
+  tv_room_mesh_options options;
+  tv_room_mesh_options_init(&options);
+  options.min_maps = 2;
+  options.min_piece_triangles = 0;
+  mesh(room, &options);
+  std::vector<tv_room_vertex> sorted = vertices;
+  std::sort(sorted.begin(), sorted.end(), is_before);
+  return sorted;
+}
+
+// What one map alone saw makes way, again and again. With the maps added to what others have made
+// again, the surface is that of unlimited memory, bit for bit, but for a few cells beside blocks
+// that nobody made again. Without that, each map takes back what it still has in the room.
+void test_what_was_pruned_comes_back_where_another_map_confirms_it() {
+  const std::vector<Map> maps = tour(hall(), box_room::pinhole(160, 120, 110), 12, 0.02f);
+  tv_room* room = new_room(0.04);
+  for (const Map& m : maps) TEST_ASSERT_EQUAL(TV_OK, add(room, m));
+  for (const Map& m : maps) TEST_ASSERT_EQUAL(TV_OK, see_through(room, m));
+  const std::vector<tv_room_vertex> unlimited = confirmed(room);
+  TEST_ASSERT_TRUE(unlimited.size() > 5000);
+  for (const bool comes_back : {true, false}) {
+    room = new_room(0.04);
+    int32_t freed = 0, all_freed = 0;
+    for (size_t k = 0; k < maps.size(); ++k) {
+      TEST_ASSERT_EQUAL(TV_OK, add(room, maps[k]));
+      if (k % 2 == 0) continue;
+      for (size_t n = 0; comes_back && n <= k; ++n)
+        TEST_ASSERT_EQUAL(TV_OK, see_through(room, maps[n]));
+      TEST_ASSERT_EQUAL(TV_OK, tv_room_prune(room, 2, &freed));
+      all_freed += freed;
+      TEST_ASSERT_EQUAL(TV_OK, tv_room_prune(room, 2, &freed));
+      TEST_ASSERT_EQUAL(0, freed);
+    }
+    TEST_ASSERT_TRUE(all_freed > 1000);
+    if (comes_back) {
+      for (const Map& m : maps) TEST_ASSERT_EQUAL(TV_OK, see_through(room, m));
+      const std::vector<tv_room_vertex> now = confirmed(room);
+      TEST_ASSERT_TRUE(
+          std::includes(unlimited.begin(), unlimited.end(), now.begin(), now.end(), is_before));
+      TEST_ASSERT_TRUE(unlimited.size() - now.size() < unlimited.size() / 200);
+    }
+    for (const Map& m : maps) TEST_ASSERT_EQUAL(TV_OK, remove(room, m));
+    tv_room_state state;
+    tv_room_state_init(&state);
+    TEST_ASSERT_EQUAL(TV_OK, tv_room_get_state(room, &state));
+    TEST_ASSERT_EQUAL(0, state.num_blocks);
+  }
+}
+
 void test_distances_that_are_none_are_unknown() {
   const float odd[] = {0.0f, -1.0f, NAN, INFINITY, -INFINITY, 1e-38f, 3e38f};
   tv_room* room = new_room();
@@ -798,6 +853,7 @@ int main(void) {
   RUN_TEST(test_what_others_see_through_vanishes_and_one_error_removes_no_wall);
   RUN_TEST(test_a_map_sees_through_later_blocks_when_told_and_is_removed_exactly_then);
   RUN_TEST(test_a_room_that_is_full_keeps_what_it_has_and_goes_on_coarser);
+  RUN_TEST(test_what_was_pruned_comes_back_where_another_map_confirms_it);
   RUN_TEST(test_distances_that_are_none_are_unknown);
   RUN_TEST(test_small_pieces_are_left_out);
   RUN_TEST(test_plain_walls_are_found_by_their_edges_and_inferred_between);

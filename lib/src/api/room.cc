@@ -15,6 +15,7 @@ namespace tv {
 namespace {
 
 constexpr int32_t kMaxSide = 16384;
+constexpr int32_t kMostMinMaps = 255;
 constexpr tv_room_options kDefaults = {sizeof(tv_room_options), 3, 0.03, 0.0};
 constexpr tv_room_mesh_options kMeshDefaults = {
     sizeof(tv_room_mesh_options), 1, 64, 0, {0, 0, 0}, {0, 0, 0}, nullptr, 0, 0, 0};
@@ -116,7 +117,7 @@ tv_status read_request(const tv_room& room, const tv_room_mesh_options* given,
   if (!all_finite(o.min, 3) || !all_finite(o.max, 3) || !is_finite(o.max_sigma)) {
     return TV_ERR_NOT_FINITE;
   }
-  bool valid = within(o.min_maps, 1, 255) && o.min_piece_triangles >= 0 &&
+  bool valid = within(o.min_maps, 1, kMostMinMaps) && o.min_piece_triangles >= 0 &&
                within(o.measured_only, 0, 1) && within(o.num_planes, 0, TV_ROOM_MAX_PLANES) &&
                o.reserved == 0 && o.max_sigma >= 0;
   if (!valid) return TV_ERR_ARGUMENT;
@@ -193,6 +194,14 @@ tv_status tv_room_see_through(tv_room* room, const tv_depth_map* map) {
   const int32_t record = tv::find_record(*room, view);
   if (record < 0) return TV_ERR_ARGUMENT;
   tv::see_through_again(*room, view, record);
+  return TV_OK;
+}
+
+tv_status tv_room_prune(tv_room* room, int32_t min_maps, int32_t* num_freed) {
+  if (room == nullptr) return TV_ERR_NULL;
+  if (!tv::within(min_maps, 1, tv::kMostMinMaps)) return TV_ERR_ARGUMENT;
+  const int32_t freed = tv::prune(*room, min_maps);
+  if (num_freed != nullptr) *num_freed = freed;
   return TV_OK;
 }
 

@@ -120,12 +120,22 @@ void find_bounds(const tv_room& room, double min[3], double max[3]) {
   }
 }
 
-bool is_void(const tv_room& room, int32_t block) {
+bool has_surface(const tv_room& room, int32_t block, int32_t min_maps) {
   const Voxel* voxels = voxels_of(room, block);
   for (int32_t v = 0; v < kBlockVoxels; ++v) {
-    if (surface_count(voxels[v].evidence) > 0) return false;
+    if (surface_count(voxels[v].evidence) >= min_maps) return true;
   }
-  return true;
+  return false;
+}
+
+int32_t prune(tv_room& room, int32_t min_maps) {
+  const int32_t before = room.num_blocks;
+  for (int32_t index = 0; index < room.end_blocks; ++index) {
+    const uint64_t key = room.blocks[index].key;
+    if (key == 0 || place_of(key).inferred || has_surface(room, index, min_maps)) continue;
+    free_block(room, index);
+  }
+  return before - room.num_blocks;
 }
 
 }  // namespace tv

@@ -131,8 +131,12 @@ inline Voxel* voxels_of(const tv_room& room, int32_t block) {
 // Writes the box around all blocks; zeros stay where there is none.
 void find_bounds(const tv_room& room, double min[3], double max[3]);
 
-// Whether no map saw a surface in any voxel of the block.
-bool is_void(const tv_room& room, int32_t block);
+// Whether at least so many maps saw a surface in one voxel of the block.
+bool has_surface(const tv_room& room, int32_t block, int32_t min_maps);
+
+// Frees the blocks of measured surface without a voxel in which at least min_maps maps saw one.
+// Returns how many.
+int32_t prune(tv_room& room, int32_t min_maps);
 
 // The largest integer that is not above x, for |x| below 2^31.
 inline int32_t floor_of(double x) {

@@ -149,7 +149,7 @@ bool contribution(const Fusion& f, const Vec3& point, bool near, Voxel* added) {
 }
 
 // Adds the view to a block, sign 1, or subtracts it, sign -1.
-void fuse_block(const Fusion& f, int32_t index, bool near, bool with_free, bool subtract) {
+void fuse_block(const Fusion& f, int32_t index, bool near, bool subtract) {
   const BlockPlace place = place_of(f.room.blocks[index].key);
   const Mat3& R = f.view.rotation;
   const double side = f.voxel * kBlockSide, half = 0.5 * f.voxel;  // a voxel is its centre
@@ -171,7 +171,6 @@ void fuse_block(const Fusion& f, int32_t index, bool near, bool with_free, bool 
         }
         Voxel added;
         if (!contribution(f, point, near, &added)) continue;
-        if (added.evidence == kSeenThrough && !with_free) continue;
         voxel->evidence += subtract ? ~added.evidence + 1 : added.evidence;
         voxel->colour += subtract ? ~added.colour + 1 : added.colour;
       }
@@ -256,16 +255,15 @@ void fuse(tv_room& room, const RoomView& view, uint32_t added_at, bool subtract)
   const Fusion f = fusion_of(room, view);
   const bool sees_through = f.view.map.inferred == 0;
   for (int32_t k = 0; k < room.num_near; ++k) {
-    const int32_t index = room.near[k];
-    fuse_block(f, index, true, room.blocks[index].born_at <= added_at, subtract);
+    if (room.blocks[room.near[k]].born_at <= added_at) fuse_block(f, room.near[k], true, subtract);
   }
   for (int32_t index = 0; sees_through && index < room.end_blocks; ++index) {
     const Block& block = room.blocks[index];
     if (block.key == 0 || block.used_at == room.num_calls || block.born_at > added_at) continue;
-    if (may_see(f, index)) fuse_block(f, index, false, true, subtract);
+    if (may_see(f, index)) fuse_block(f, index, false, subtract);
   }
   for (int32_t k = 0; k < room.num_near; ++k) {
-    if (is_void(room, room.near[k])) free_block(room, room.near[k]);
+    if (!has_surface(room, room.near[k], 1)) free_block(room, room.near[k]);
   }
 }
 
@@ -340,12 +338,14 @@ void subtract_view(tv_room& room, const RoomView& view, uint32_t added_at) {
   fuse(room, view, added_at, true);
 }
 
-void see_through(tv_room& room, const RoomView& view, uint32_t added_at) {
+void add_to_new_blocks(tv_room& room, const RoomView& view, uint32_t added_at) {
+  list_near_blocks(room, view, false);
   const Fusion f = fusion_of(room, view);
-  for (int32_t index = 0; view.map.inferred == 0 && index < room.end_blocks; ++index) {
+  for (int32_t index = 0; index < room.end_blocks; ++index) {
     const Block& block = room.blocks[index];
     if (block.key == 0 || block.born_at <= added_at) continue;
-    if (may_see(f, index)) fuse_block(f, index, false, true, false);
+    const bool near = block.used_at == room.num_calls;
+    if (near || (view.map.inferred == 0 && may_see(f, index))) fuse_block(f, index, near, false);
   }
 }
 

@@ -33,11 +33,12 @@ uint64_t digest_of(const RoomView& view);
 bool list_near_blocks(tv_room& room, const RoomView& view, bool make);
 
 // Adds the view's contributions to the blocks of room.near, and to what it sees through in all
-// others; or subtracts them, with what it saw through in those that existed when it was added.
+// others; or subtracts them from those that existed when it was added.
 void add_view(tv_room& room, const RoomView& view);
 void subtract_view(tv_room& room, const RoomView& view, uint32_t added_at);
 
-// Adds what the view sees through in the blocks that were made since it was added.
-void see_through(tv_room& room, const RoomView& view, uint32_t added_at);
+// Adds the view's contributions to the blocks that were made since it was added: to what it sees
+// through, and to what prune freed of its surface and other maps have needed again.
+void add_to_new_blocks(tv_room& room, const RoomView& view, uint32_t added_at);
 
 }  // namespace tv

@@ -26,7 +26,7 @@ void remove_map(tv_room& room, const RoomView& view, int32_t record) {
 }
 
 void see_through_again(tv_room& room, const RoomView& view, int32_t record) {
-  see_through(room, view, room.records[record].added_at);
+  add_to_new_blocks(room, view, room.records[record].added_at);
   room.records[record].added_at = room.num_calls;
 }
 

@@ -194,16 +194,35 @@ bool RoomBuilder::add(const Map& map) {
   return true;
 }
 
+// Frees the blocks in which fewer maps saw a surface than the mesh asks for. False where that is
+// less than an eighth of the memory: it would soon be full again.
+bool RoomBuilder::prune() {
+  constexpr int32_t kLeastShare = 8;
+  int32_t freed = 0;
+  check(tv_room_prune(room_, kFewestMaps, &freed), "the room's memory");
+  tv_room_state state;
+  tv_room_state_init(&state);
+  check(tv_room_get_state(room_, &state), "the room");
+  return freed >= state.cap_blocks / kLeastShare;
+}
+
+// False where the memory is full, and stays so.
+bool RoomBuilder::fuse(const Map& map) {
+  if (add(map)) return true;
+  see_through();  // what an earlier call freed may have been measured again
+  return prune() && add(map);
+}
+
 // Where the memory is full, all maps are fused again with voxels of twice the side. In a room that
 // was coarsened as it is, no map could see through what is added later, and no plane be carried.
 void RoomBuilder::fuse_newest() {
   constexpr double kMostDoubled = 65536;
-  if (add(maps_.back())) return;
+  if (fuse(maps_.back())) return;
   do {
     if (voxel_ > kMostDoubled * first_voxel_)
       throw BadInput("the room does not fit into --max-memory");
     begin(2 * voxel_);
-  } while (!std::all_of(maps_.begin(), maps_.end(), [this](const Map& map) { return add(map); }));
+  } while (!std::all_of(maps_.begin(), maps_.end(), [this](const Map& map) { return fuse(map); }));
 }
 
 void RoomBuilder::find_up(RoomModel& model) const {
@@ -290,7 +309,8 @@ void RoomBuilder::infer(RoomModel& model) {
     given.distance = distance.data();
     given.sigma = sigma.data();
     given.inferred = 1;
-    const tv_status status = tv_room_add(room_, &given);
+    tv_status status = tv_room_add(room_, &given);
+    if (status == TV_ERR_CAPACITY && prune()) status = tv_room_add(room_, &given);
     if (status == TV_ERR_CAPACITY || status == TV_ERR_LIMITS)
       ++model.inferred_without_memory;
     else

@@ -49,6 +49,8 @@ class RoomBuilder {
   void run_until(size_t view);
   void begin(double voxel);
   bool add(const Map& map);
+  bool prune();
+  bool fuse(const Map& map);
   void fuse_newest();
   void fill(const Map& map, tv_depth_map& out);
   void find_up(RoomModel& model) const;

@@ -1,6 +1,7 @@
 """A room's surface out of a flight: for each keyframe the views that show its scene from elsewhere,
 its depth map, and the fusion of all."""
 
+import math
 import time
 from dataclasses import dataclass, field
 
@@ -14,6 +15,7 @@ WANTED = ((0.1, 1), (0.1, -1), (0.2, 1), (0.2, -1))
 NEIGHBOURS = 120  # frames before and after a keyframe among which its partners are looked for
 MOST_TURN = 0.35  # radians between the axes of a keyframe and a partner
 LEAST_WITNESSES = 2  # of a depth that is measured
+LEAST_SHARE = 8  # so much of the memory is freed at least, or voxels become coarser
 TRUNCATION_VOXELS = 5  # three standard deviations of a depth, 1.8 % of it in the median
 MOST_SIGMA_VOXELS = 1.5  # of surface that is kept, as in `twoview room`
 
@@ -81,23 +83,64 @@ def depth_of(flight, index, pictures):
                           far_depth=found[2])
 
 
+class Fusion:
+    """A room and the keyframes in it, in memory given beforehand, as `twoview room` has it: where
+    it is full, what one keyframe alone saw makes way; else all are fused again, coarser."""
+
+    def __init__(self, settings):
+        self.settings, self.keyframes = settings, []  # (index of the frame, pose, arrays)
+        self.begin(settings.voxel)
+
+    def begin(self, voxel):
+        truncation = math.ceil(TRUNCATION_VOXELS * self.settings.voxel / voxel)
+        self.room = tv.Room(self.settings.memory_mib << 20, voxel=voxel,
+                            truncation_voxels=max(2, truncation))
+
+    def add(self, pose, arrays, **keywords):
+        """Whether there is memory for a map."""
+        for is_last in (False, True):
+            try:
+                self.room.add(*pose, *arrays, **keywords)
+                return True
+            except tv.TV_ERR_CAPACITY:
+                if is_last:
+                    return False
+                self.see_through()
+                freed = self.room.prune(self.settings.min_maps)
+                if freed < self.room.state.cap_blocks // LEAST_SHARE:
+                    return False
+
+    def add_keyframe(self, *keyframe):
+        self.keyframes.append(keyframe)
+        waiting = [keyframe]
+        while not all(self.add(pose, arrays, mask=arrays[3]) for _, pose, arrays in waiting):
+            voxel = 2 * self.room.state.voxel
+            self.room.close()
+            self.begin(voxel)
+            waiting = self.keyframes
+
+    def see_through(self):
+        for _, pose, arrays in self.keyframes:
+            try:
+                self.room.see_through(*pose, *arrays, mask=arrays[3])
+            except tv.TV_ERR_ARGUMENT:
+                pass  # not added yet
+
+    def infer(self, planes):
+        for _, pose, arrays in self.keyframes:
+            distance, sigma = self.room.infer(planes, *pose, *arrays, mask=arrays[3])
+            if distance.any():
+                self.add(pose, (distance, sigma), inferred=True)  # or is left out
+        self.see_through()
+
+
 def make(flight, settings=Settings(), depth_of=depth_of):
     """The Model of a Flight; depth_of: what makes the maps, a peer perhaps."""
     def pictures(i):
         return cv2.imread(f"{flight.folder}/{flight.names[i]}", cv2.IMREAD_GRAYSCALE)
 
-    room = tv.Room(settings.memory_mib << 20, voxel=settings.voxel,
-                   truncation_voxels=TRUNCATION_VOXELS)
-    keyframes, spent_depth, spent_fusion = [], 0.0, 0.0
-
-    def add(pose, arrays):
-        while True:
-            try:
-                room.add(*pose, *arrays, mask=arrays[3])
-                return
-            except tv.TV_ERR_CAPACITY:
-                room.coarsen()
-
+    fusion = Fusion(settings)
+    spent_depth, spent_fusion = 0.0, 0.0
     for index in flight.keyframes:
         begin = time.process_time()
         found = depth_of(flight, index, pictures)
@@ -108,38 +151,19 @@ def make(flight, settings=Settings(), depth_of=depth_of):
         measured = np.where(found.witnesses >= LEAST_WITNESSES, found.distance, 0)
         # grey is 0 where the lens shows nothing, which makes it the mask as well
         arrays = (measured, found.sigma, found.witnesses, found.grey)
-        pose = (found.camera, flight.R[index], flight.centres[index])
-        add(pose, arrays)
+        fusion.add_keyframe(index, (found.camera, flight.R[index], flight.centres[index]), arrays)
         spent_fusion += time.process_time() - begin
-        keyframes.append((index, pose, arrays))
     begin = time.process_time()
-
-    def see_through():
-        seen = 0
-        for _, pose, arrays in keyframes:
-            try:
-                room.see_through(*pose, *arrays, mask=arrays[3])
-                seen += 1
-            except tv.TV_ERR_ARGUMENT:
-                pass  # fixed by a coarser voxel
-        return seen
-
-    all_see = see_through() == len(keyframes)
+    fusion.see_through()
+    room = fusion.room
     planes = room.find_planes()
-    if not settings.measured_only and all_see:
-        for _, pose, arrays in keyframes:
-            distance, sigma = room.infer(planes, *pose, *arrays, mask=arrays[3])
-            if distance.any():
-                try:
-                    room.add(*pose, distance, sigma, inferred=True)
-                except tv.TV_ERR_CAPACITY:
-                    pass  # what was measured keeps the memory
-        see_through()
+    if not settings.measured_only:
+        fusion.infer(planes)
     mesh = room.mesh(measured_only=settings.measured_only, min_maps=settings.min_maps,
                      planes=planes, max_sigma=MOST_SIGMA_VOXELS * room.state.voxel)
     spent_mesh = time.process_time() - begin
-    num = max(len(keyframes), 1)
-    model = Model(mesh.vertices, mesh.triangles, planes, room.state.voxel, keyframes,
+    num = max(len(fusion.keyframes), 1)
+    model = Model(mesh.vertices, mesh.triangles, planes, room.state.voxel, fusion.keyframes,
                   1e3 * spent_depth / num, 1e3 * spent_fusion / num, 1e3 * spent_mesh)
     room.close()
     return model
