@@ -173,6 +173,33 @@ void test_covariance_of_the_inverse_of_the_inverse_is_itself(void) {
   }
 }
 
+// The variance of the direction along a step across t is the same in both parameters, also where
+// the axes that they are built from are others; what carries it back gives it again.
+void test_covariance_is_carried_to_a_direction_near_it(void) {
+  tv::Random random = tv::random_seeded(15);
+  for (const Vec3& t : {Vec3(0.3, 0.3 - 1e-9, 0.9), Vec3(0.1, 0.7, -0.2)}) {
+    const tv::Vec3 from = t.normalized(), to = (t + Vec3(0, 2e-9, 0)).normalized();
+    const Eigen::Matrix<double, 5, 5, Eigen::RowMajor> A = random_pose(&random).covariance;
+    double there[25], back[25];
+    tv::carry_covariance(from, to, A.data(), there);
+    Vec3 b[2], c[2];
+    tv::tangent_basis(from, &b[0], &b[1]);
+    tv::tangent_basis(to, &c[0], &c[1]);
+    const Vec3 across = from.cross(Vec3(0.2, -0.5, 0.4));
+    double before = 0, after = 0;
+    for (int i = 0; i < 2; ++i) {
+      for (int j = 0; j < 2; ++j) {
+        before += across.dot(b[i]) * across.dot(b[j]) * A(3 + i, 3 + j);
+        after += across.dot(c[i]) * across.dot(c[j]) * there[5 * (3 + i) + 3 + j];
+      }
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, before, after);
+    for (int k = 0; k < 3; ++k) TEST_ASSERT_TRUE(there[6 * k] == A(k, k));
+    tv::carry_covariance(to, from, there, back);
+    for (int k = 0; k < 25; ++k) TEST_ASSERT_DOUBLE_WITHIN(1e-12, A(k / 5, k % 5), back[k]);
+  }
+}
+
 // Of a pose and of its inverse the direction's sigma is the same: the larger of the two, each the
 // root of the trace of its covariance's block.
 void test_sigma_of_the_direction_is_the_larger_of_the_pose_and_its_inverse(void) {
@@ -235,6 +262,7 @@ int main(void) {
   RUN_TEST(test_binomials_and_false_alarms_follow_their_formulas);
   RUN_TEST(test_chance_of_agreement_is_near_a_bands_share_of_the_image);
   RUN_TEST(test_covariance_of_the_inverse_of_the_inverse_is_itself);
+  RUN_TEST(test_covariance_is_carried_to_a_direction_near_it);
   RUN_TEST(test_sigma_of_the_direction_is_the_larger_of_the_pose_and_its_inverse);
   RUN_TEST(test_covariance_of_the_inverse_follows_a_step_of_the_pose);
   return UNITY_END();

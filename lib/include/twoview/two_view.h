@@ -292,8 +292,8 @@ typedef struct tv_two_view {
   /* The relative standard deviation of the focal length (of camera0's, where the cameras differ)
      that the covariance contains: what the matches leave of focal_sigma0 where it was refined, else
      focal_sigma0 as given. 0 where it is taken as exact, or there is no covariance. Bundle
-     adjustment in tv_reconstruct leaves it as it is, though its covariance takes the cameras as
-     exact. */
+     adjustment in tv_reconstruct leaves it, and the covariance that contains it, as the estimate
+     has them. */
   double focal_sigma;
 } tv_two_view;
 

@@ -7,6 +7,7 @@
 #include "pipeline/bundle.h"
 #include "pipeline/guided.h"
 #include "pipeline/pair_result.h"
+#include "robust/covariance.h"
 #include "triangulation/triangulation.h"
 
 namespace tv {
@@ -130,12 +131,14 @@ void store_unit(const Mat3& m, double out[9]) {
   for (int k = 0; k < 9; ++k) out[k] = unit(k / 3, k % 3);
 }
 
-// Adjusts pose and points together, and computes E, F and the covariance anew.
+// Adjusts pose and points together, and computes E and F anew. The covariance that was judged stays
+// that of the pose: the adjustment's own is of independent noise and exact cameras.
 void adjust(tv_context* context, const PairTask& task, PairArrays& arrays, tv_two_view* two_view) {
   tv_camera_pair& pair = *arrays.pair;
   BundleOutcome outcome;
-  adjust_pair(context, arrays.pairs, task.bundle, read_motion(pair), &pair, arrays.points,
-              &outcome);
+  const Motion start = read_motion(pair);
+  adjust_pair(context, arrays.pairs, task.bundle, start, &pair, arrays.points, &outcome);
+  if (!outcome.moved) return;
   std::copy(pair.cam1_from_cam0_R, pair.cam1_from_cam0_R + 9, two_view->R);
   std::copy(pair.cam1_from_cam0_t, pair.cam1_from_cam0_t + 3, two_view->t);
   Pose pose;
@@ -146,11 +149,10 @@ void adjust(tv_context* context, const PairTask& task, PairArrays& arrays, tv_tw
   store_unit(inverse_intrinsics(intrinsics_of(pair.camera1)).transpose() * E *
                  inverse_intrinsics(intrinsics_of(pair.camera0)),
              two_view->F);
-  two_view->has_covariance = outcome.has_covariance;
-  std::fill_n(two_view->covariance, 25, 0.0);
-  if (!outcome.has_covariance) return;
-  std::copy(outcome.covariance, outcome.covariance + 25, two_view->covariance);
-  two_view->noise_px = outcome.noise_px;
+  if (!two_view->has_covariance) return;
+  double judged[25];
+  std::copy(two_view->covariance, two_view->covariance + 25, judged);
+  carry_covariance(start.pose.t, pose.t, judged, two_view->covariance);
 }
 
 }  // namespace

@@ -50,6 +50,24 @@ void multiply5(const double A[25], const double B[25], double C[25]) {
   }
 }
 
+// J C J'.
+void map_covariance(const double J[5][5], const double covariance[25], double mapped[25]) {
+  double half[5][5];
+  for (int r = 0; r < 5; ++r) {
+    for (int c = 0; c < 5; ++c) {
+      half[r][c] = 0;
+      for (int k = 0; k < 5; ++k) half[r][c] += J[r][k] * covariance[5 * k + c];
+    }
+  }
+  for (int r = 0; r < 5; ++r) {
+    for (int c = r; c < 5; ++c) {
+      double sum = 0;
+      for (int k = 0; k < 5; ++k) sum += half[r][k] * J[c][k];
+      mapped[5 * r + c] = mapped[5 * c + r] = sum;
+    }
+  }
+}
+
 }  // namespace
 
 double rotation_sigma(const double covariance[25]) {
@@ -188,20 +206,20 @@ void invert_covariance(const Pose& pose, const Pose& inverse, const double covar
     J[3][k] = move.dot(c1);
     J[4][k] = move.dot(c2);
   }
-  double half[5][5];
-  for (int r = 0; r < 5; ++r) {
-    for (int c = 0; c < 5; ++c) {
-      half[r][c] = 0;
-      for (int k = 0; k < 5; ++k) half[r][c] += J[r][k] * covariance[5 * k + c];
-    }
+  map_covariance(J, covariance, inverse_covariance);
+}
+
+void carry_covariance(const Vec3& t, const Vec3& to, const double covariance[25],
+                      double carried[25]) {
+  Vec3 b[2], c[2];
+  tangent_basis(t, &b[0], &b[1]);
+  tangent_basis(to, &c[0], &c[1]);
+  double J[5][5] = {};
+  for (int k = 0; k < 3; ++k) J[k][k] = 1;
+  for (int r = 0; r < 2; ++r) {
+    for (int k = 0; k < 2; ++k) J[3 + r][3 + k] = c[r].dot(b[k]);
   }
-  for (int r = 0; r < 5; ++r) {
-    for (int c = r; c < 5; ++c) {
-      double sum = 0;
-      for (int k = 0; k < 5; ++k) sum += half[r][k] * J[c][k];
-      inverse_covariance[5 * r + c] = inverse_covariance[5 * c + r] = sum;
-    }
-  }
+  map_covariance(J, covariance, carried);
 }
 
 }  // namespace tv

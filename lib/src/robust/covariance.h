@@ -58,4 +58,9 @@ bool plane_uncertainty(const RayPairs& pairs, const int32_t* indices, int count,
 void invert_covariance(const Pose& pose, const Pose& inverse, const double covariance[25],
                        double inverse_covariance[25]);
 
+// The covariance of a pose with the direction t, in the parameters of a pose near it whose
+// direction is `to`.
+void carry_covariance(const Vec3& t, const Vec3& to, const double covariance[25],
+                      double carried[25]);
+
 }  // namespace tv
