@@ -36,7 +36,8 @@ class Folders(CliTest):
 
     def test_numbers_that_are_too_long_for_a_machine_word_count_too(self):
         self.fill(first=99999999999999999990, pattern="t{}.png")
-        self.assertLess(self.track()["truth"]["ate_rmse_percent_of_path"], 1)
+        result = self.track(truth="\ufeff" + TUM_TRUTH)
+        self.assertLess(result["truth"]["ate_rmse_percent_of_path"], 1)
 
     def fill_as(self, names):
         for name, data in zip(names, PICTURES):
@@ -211,6 +212,7 @@ class Folders(CliTest):
         self.assertEqual(result["num_frames"], COUNT)
         self.assertLess(result["truth"]["ate_rmse_percent_of_path"], 1)
         self.assertEqual(result["notes"], [
+            "not used: 1 picture in the subfolder below",
             f"5 pictures of frames are left out: ._frame1.png {HIDDEN} (so are 2 more); "
             "frame3b.NEF is a camera's raw picture, which is not read: develop it to TIFF, PNG or "
             f"JPEG; frame0.png is 64x48, not {WIDTH}x{HEIGHT} as most are"])
@@ -228,14 +230,16 @@ class Folders(CliTest):
 
     def test_a_list_keeps_the_times_of_pictures_that_it_cannot_use(self):
         self.fill("set/images", first=0, pattern="{:05}.png")
-        self.write("set/frames.txt", "".join(f"{t:.9f} images/{i:05}.png\n"
-                                             for i, t in enumerate(TIMES)))
+        self.write("set/frames.txt", "\ufeff" + "".join(
+            f"{t:.9f} images/{i:05}.png\n" for i, t in enumerate(TIMES))
+            + f"{TIMES[-1] + 1} images/00001.png\n")
         self.write("set/images/00000.png", png(32, 24, bytes(32 * 24)))
         camera = self.write("own.yaml", camera_yaml())
         self.succeed(self.run_program("odometry", "set", "-o", self.out, "--camera", camera))
         result = self.result()
-        self.assertEqual((result["num_frames"], result["num_unreadable"]), (COUNT, 1))
+        self.assertEqual((result["num_frames"], result["num_unreadable"]), (COUNT + 1, 1))
         self.assertIn("00000.png is 32x24, not 320x240 as most are", " ".join(result["notes"]))
+        self.assertIn("names 1 picture again, the first images/00001.png", result["notes"][0])
 
     def test_a_folder_of_which_nothing_is_left_is_refused(self):
         self.write("none/._0.png", PICTURES[0])

@@ -516,7 +516,7 @@ class OdometryTest(CliTest):
                         for i in range(2 * COUNT + 2)])
         self.succeed(self.odometry(source))
         self.assertEqual(self.trajectory(), first)
-        self.imu(lines=[f"{t:.9f} 1 0 0 0 0.01 nan nan nan 0 0 nan" for t in TIMES])
+        self.imu(lines=[f"{t:.9f} 1 0 0 0 0.01 nan NaN nan 0 0 nan" for t in TIMES])
         self.succeed(self.odometry(source))
         self.assertEqual(self.result()["scale"], "unit")
         self.imu(lines=[f"{t + 9:.9f} 1 0 0 0 0.01 1.5 0.015 0 0 0 0.02" for t in TIMES])

@@ -927,7 +927,8 @@ void test_times_that_are_frame_numbers_are_understood_and_said() {
                {1, 1, "%d.png", "counted from 1", 60},
                {100, 2, "%d.png", "the numbers in the pictures' names", 60},
                {0, 1 / 15.0, "%d.png", nullptr, 60},
-               {0, 1.3 / 15, "%d.png", "are the times of one clock?", 10}};
+               {0, 1.3 / 15, "%d.png", "are the times of one clock?", 10},
+               {0, 1 / 120.0, "%d.png", "only 8 of its 60 poses are compared", 8}};
   for (const auto& c : cases) {
     int met = 0;
     const std::string words = words_on_numbers(c.first, c.step, c.pattern, &met);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <set>
 
 #include "base/error.h"
 #include "base/matrix.h"
@@ -185,6 +186,43 @@ void add_note(Folder& folder, const std::string& note) {
   if (!note.empty()) folder.notes.push_back(note);
 }
 
+// A line where a list names a file more than once; else empty.
+std::string repeated_words(const Folder& folder) {
+  std::set<std::string> names;
+  std::string first;
+  size_t count = 0;
+  for (const Listed& listed : folder.frames) {
+    if (names.insert(listed.name).second) continue;
+    if (++count == 1) first = listed.name;
+  }
+  if (count == 0) return "";
+  return folder.files.back() + " names " + std::to_string(count) +
+         (count == 1 ? " picture" : " pictures") + " again, the first " + first +
+         ": a picture was taken once";
+}
+
+// What the subfolders of a folder hold, which is not used; empty where they hold no pictures.
+std::string subfolder_words(const fs::path& root) {
+  size_t num_folders = 0, num_pictures = 0;
+  std::string first;
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(root, error)) {
+    const std::string name = entry.path().filename().string();
+    if (!entry.is_directory(error) || name[0] == '.') continue;
+    size_t count = 0;
+    for (const fs::directory_entry& inner : fs::directory_iterator(entry.path(), error))
+      count += has_picture_ending(inner.path());
+    if (count == 0) continue;
+    num_pictures += count;
+    if (++num_folders == 1 || name < first) first = name;
+  }
+  if (num_folders == 0) return "";
+  return std::to_string(num_pictures) + (num_pictures == 1 ? " picture" : " pictures") + " in " +
+         (num_folders == 1 ? "the subfolder "
+                           : std::to_string(num_folders) + " subfolders, the first ") +
+         first;
+}
+
 void add_cameras(Folder& folder) {
   const std::string path = (fs::path(folder.path) / "cameras.yaml").string();
   if (!is_file(path)) return;
@@ -336,6 +374,44 @@ void refuse_fps(double fps, const Folder& folder) {
                    " is " + folder.kind + ", which has times");
 }
 
+// A folder of images in the order of their names, at a rate that the user gives.
+void read_pictures(Folder& folder, double fps, bool is_sequence) {
+  const fs::path root = folder.path;
+  FolderPictures pictures = pictures_of(root);
+  const std::vector<std::string>& names = pictures.names;
+  folder.left_out = std::move(pictures.left_out);
+  if (names.empty() && !folder.left_out.empty())
+    throw BadInput(folder.path +
+                   " holds no image that is read: " + left_out_words(folder.left_out, folder.path));
+  const std::string below = subfolder_words(root);
+  if (names.empty())
+    throw BadInput(folder.path +
+                   " holds neither frames.txt, rgb.txt, mav0/cam0/data.csv, image_0, video.pave "
+                   "nor any image" +
+                   (below.empty() ? "" : ", but " + below));
+  if (!(fps > 0))
+    throw BadInput("--fps is required: " + folder.path + " holds images without times");
+  for (const std::string& name : names) folder.frames.push_back({0, name, ""});
+  leave_out_other_sizes(folder, false);
+  std::vector<std::string> kept;
+  for (const Listed& listed : folder.frames) kept.push_back(listed.name);
+  if (const std::string kinds = mixed_names(kept); is_sequence && !kinds.empty())
+    throw BadInput(folder.path + " holds pictures with the same numbers " + kinds +
+                   ": of several cameras or takes, or copies? Give those of one, in a folder of "
+                   "their own");
+  if (is_sequence) {
+    SequenceOrder order = sequence_order(root, kept);
+    kept = std::move(order.names);
+    add_note(folder, order.note);
+  }
+  for (size_t k = 0; k < kept.size(); ++k)
+    folder.frames[k] = {static_cast<double>(k) / fps, kept[k], ""};
+  add_note(folder, jump_words(kept));
+  add_note(folder, pictures.note);
+  if (!below.empty()) add_note(folder, "not used: " + below);
+  add_cameras(folder);
+}
+
 }  // namespace
 
 std::unique_ptr<FrameSource> open_image_folder(const std::string& path, double fps, bool with_imu,
@@ -347,6 +423,7 @@ std::unique_ptr<FrameSource> open_image_folder(const std::string& path, double f
     folder.kind = "a set folder (frames.txt)";
     refuse_fps(fps, folder);
     read_list(folder, "frames.txt", 1, "", {"", "images"});
+    add_note(folder, repeated_words(folder));
     add_cameras(folder);
     add_truth(folder, "groundtruth.txt");
     if (with_imu) add_measurements(folder);
@@ -370,35 +447,7 @@ std::unique_ptr<FrameSource> open_image_folder(const std::string& path, double f
     return std::make_unique<KittiFolder>(std::move(folder));
   } else {
     folder.kind = "a folder of images";
-    FolderPictures pictures = pictures_of(root);
-    const std::vector<std::string>& names = pictures.names;
-    folder.left_out = std::move(pictures.left_out);
-    if (names.empty() && !folder.left_out.empty())
-      throw BadInput(path +
-                     " holds no image that is read: " + left_out_words(folder.left_out, path));
-    if (names.empty())
-      throw BadInput(path +
-                     " holds neither frames.txt, rgb.txt, mav0/cam0/data.csv, image_0, video.pave "
-                     "nor any image");
-    if (!(fps > 0)) throw BadInput("--fps is required: " + path + " holds images without times");
-    for (const std::string& name : names) folder.frames.push_back({0, name, ""});
-    leave_out_other_sizes(folder, false);
-    std::vector<std::string> kept;
-    for (const Listed& listed : folder.frames) kept.push_back(listed.name);
-    if (const std::string kinds = mixed_names(kept); is_sequence && !kinds.empty())
-      throw BadInput(path + " holds pictures with the same numbers " + kinds +
-                     ": of several cameras or takes, or copies? Give those of one, in a folder of "
-                     "their own");
-    if (is_sequence) {
-      SequenceOrder order = sequence_order(root, kept);
-      kept = std::move(order.names);
-      add_note(folder, order.note);
-    }
-    for (size_t k = 0; k < kept.size(); ++k)
-      folder.frames[k] = {static_cast<double>(k) / fps, kept[k], ""};
-    add_note(folder, jump_words(kept));
-    add_note(folder, pictures.note);
-    add_cameras(folder);
+    read_pictures(folder, fps, is_sequence);
     return std::make_unique<ImageFolder>(std::move(folder));
   }
   leave_out_other_sizes(folder, true);

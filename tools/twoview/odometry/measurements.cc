@@ -25,7 +25,8 @@ std::vector<double> numbers_of(const std::vector<std::string_view>& words, size_
   std::vector<double> numbers;
   for (size_t k = first; k < words.size(); ++k) {
     double value = std::numeric_limits<double>::quiet_NaN();
-    if (words[k] != "nan" && !to_number(words[k], value))
+    const bool is_nan = words[k] == "nan" || words[k] == "NaN" || words[k] == "NAN";
+    if (!is_nan && !to_number(words[k], value))
       throw BadInput(where + " has '" + std::string(words[k]) +
                      "', which is neither a finite number nor nan");
     numbers.push_back(value);

@@ -12,6 +12,8 @@ constexpr std::string_view kBlanks = " \t\r\f\v";
 
 std::vector<TextLine> lines_of(std::string_view text) {
   std::vector<TextLine> lines;
+  constexpr std::string_view mark = "\xef\xbb\xbf";  // of UTF-8, as Windows' editors write it
+  if (text.substr(0, mark.size()) == mark) text.remove_prefix(mark.size());
   for (int number = 1; !text.empty(); ++number) {
     const size_t end = std::min(text.find('\n'), text.size());
     std::string_view line = text.substr(0, end);

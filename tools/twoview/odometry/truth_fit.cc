@@ -129,9 +129,14 @@ std::string fit_times(const Trajectory& estimate, TruePoses& truth, const FrameC
            " of its poses have a time of the path";
   }
   const size_t could = num_that_could_meet(estimate, truth.poses);
-  if (met >= kFewest && 2 * met >= could) return "";
   char text[240];
-  if (met >= kFewest)
+  if (met >= kFewest && 2 * met >= could)
+    std::snprintf(text, sizeof text,
+                  "the truth is of %.6g to %.6g s, the path of %.6g to %.6g s: only %zu of its %zu "
+                  "poses are compared (a clock of another rate, or numbers in place of times?)",
+                  truth.poses.front().time_s, truth.poses.back().time_s, estimate.front().time_s,
+                  estimate.back().time_s, met, estimate.size());
+  else if (met >= kFewest)
     std::snprintf(text, sizeof text,
                   "only %zu poses of the truth have a time of the path (to 0.01 s), of %zu within "
                   "the time of both: are the times of one clock?",
