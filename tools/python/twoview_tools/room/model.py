@@ -17,7 +17,7 @@ MOST_TURN = 0.35  # radians between the axes of a keyframe and a partner
 LEAST_WITNESSES = 2  # of a depth that is measured
 LEAST_SHARE = 8  # so much of the memory is freed at least, or voxels become coarser
 TRUNCATION_VOXELS = 5  # three standard deviations of a depth, 1.8 % of it in the median
-MOST_SIGMA_VOXELS = 1.0  # of surface that is kept, as in `twoview room`
+MOST_SIGMA_VOXELS = 1.5  # of surface that is kept, as in `twoview room`
 
 
 @dataclass
