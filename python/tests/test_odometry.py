@@ -1,5 +1,7 @@
 """Odometry: a flight past textured walls, whose path is known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import twoview as tv
@@ -109,6 +111,34 @@ def test_a_known_frame_is_located(frames, flight):
     assert odometry.locate(frames[15], mask=mask & False).num_keypoints == 0
     with pytest.raises(ValueError, match="mask"):
         odometry.locate(frames[15], mask=mask[1:])
+
+
+def test_the_path_has_frames_that_tracking_had_no_pose_for(frames, flight):
+    odometry, states = flight
+    missing = next(i for i, s in enumerate(states[10:], 10) if not s.is_keyframe)
+    path = tv.Path(odometry)
+    for i, state in enumerate(states):
+        path.add(replace(state, reference_id=None) if i == missing else state, i / 30)
+    poses = path.poses()
+    assert len(path) == 20 and poses[missing].origin == tv.PathOrigin.UNKNOWN
+    assert poses[missing].R is None and poses[missing].segment is None
+    # The first frame became a keyframe when a later one completed the start.
+    assert states[0].R is None and poses[0].origin == tv.PathOrigin.TRACKED
+    for i, state in enumerate(states):
+        if state.R is None or i == missing:
+            continue
+        R, t, segment = odometry.pose_of(state)
+        assert poses[i].origin == tv.PathOrigin.TRACKED and poses[i].segment == segment
+        assert np.array_equal(poses[i].R, R) and np.array_equal(poses[i].t, t)
+    assert not path.locate(missing, np.full((HEIGHT, WIDTH), 128, np.uint8))
+    assert not path.locate(missing, frames[0])  # it cannot have flown there
+    assert path.locate(missing, frames[missing])
+    found = path.poses()[missing]
+    _, t, segment = odometry.pose_of(states[missing])
+    assert found.origin == tv.PathOrigin.LOCATED and found.segment == segment
+    assert np.linalg.norm(found.t - t) < 0.05 * np.linalg.norm(poses[19].t)
+    with pytest.raises(ValueError, match="comes after"):
+        path.add(states[0], 0)
 
 
 def test_bad_input_is_refused(frames):

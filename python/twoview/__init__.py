@@ -38,13 +38,14 @@ from .context import Context
 from .dense import densify
 from .depth_map import DepthMap, sweep_depth
 from .enums import (CameraModel, Kernels, Kind, Loss, MapReason, Normalisation, OdometryStatus,
-                    Orientation, PointStatus, Purpose, Reason, RoomPlaneKind, ScaleSource, Solver,
-                    Stage, Status, Triangulation, Verdict)
+                    Orientation, PathOrigin, PointStatus, Purpose, Reason, RoomPlaneKind,
+                    ScaleSource, Solver, Stage, Status, Triangulation, Verdict)
 from .odometry import Keyframe, Odometry, OdometryState
 from .options import (AbsolutePoseOptions, BundleOptions, DenseOptions, DepthOptions,
                       EstimateOptions, FeatureOptions, GuidedOptions, MatchOptions, OdometryOptions,
                       RoomInferOptions, RoomMeshOptions,
                       RoomOptions, RoomPlaneOptions, WindowOptions)
+from .path import Path, PathPose
 from .room import ROOM_DEFAULT_BYTES, Room, RoomMesh, RoomState
 from .stages import (BundleResult, Reconstruction, TwoView, adjust_two_view, align_matches,
                      correct_matches, corrected_camera, describe, detect, estimate_two_view,
@@ -79,8 +80,9 @@ __all__ = [
     "Loss", "MAP_OBSERVATION", "MAP_POINT", "MapReason", "MatchOptions", "Normalisation",
     "OBSERVATION",
     "Odometry", "OdometryOptions", "OdometryState", "OdometryStatus", "Orientation",
-    "PLAIN_FILE", "POINT", "POSE_PRIOR", "PointStatus", "Purpose", "ROOM_DEFAULT_BYTES",
-    "ROOM_PLANE", "ROOM_VERTEX", "Reason", "Reconstruction", "Room", "RoomInferOptions",
+    "PLAIN_FILE", "POINT", "POSE_PRIOR", "Path", "PathOrigin", "PathPose", "PointStatus",
+    "Purpose", "ROOM_DEFAULT_BYTES", "ROOM_PLANE", "ROOM_VERTEX", "Reason", "Reconstruction",
+    "Room", "RoomInferOptions",
     "RoomMesh", "RoomMeshOptions", "RoomOptions", "RoomPlaneKind", "RoomPlaneOptions",
     "RoomState", "ScaleSource", "Solver", "Stage", "Status", "StatusError", "TV_ERR_ALIGNMENT",
     "TV_ERR_ARGUMENT", "TV_ERR_CAMERA", "TV_ERR_CAPACITY", "TV_ERR_EFFORT", "TV_ERR_KERNELS",

@@ -279,6 +279,17 @@ class tv_keyframe(Structure):
                 ("num_observations", c_int32)]
 
 
+class tv_path_frame(Structure):
+    _fields_ = [("time_s", c_double), ("frame", c_int32), ("origin", c_int32),
+                ("reference_id", c_int32), ("reserved", c_int32),
+                ("reference_from_cam_R", c_double * 9), ("reference_from_cam_t", c_double * 3)]
+
+
+class tv_path_pose(Structure):
+    _fields_ = [("origin", c_int32), ("segment", c_int32), ("world_from_cam_R", c_double * 9),
+                ("world_from_cam_t", c_double * 3)]
+
+
 class tv_map_point(Structure):
     _fields_ = [("id", c_int32), ("segment", c_int32), ("num_observations", c_int32),
                 ("grey", c_int32), ("position", c_double * 3), ("covariance", c_double * 9)]
@@ -376,7 +387,8 @@ STRUCTS = [tv_limits, tv_image, tv_camera, tv_camera_pair, tv_epipolar, tv_keypo
            tv_pixel_points, tv_absolute_pose_options, tv_absolute_pose, tv_window_view,
            tv_observation, tv_pose_prior, tv_gravity_prior, tv_distance_prior, tv_window,
            tv_window_options, tv_window_result, tv_odometry_options, tv_odometry_frame,
-           tv_odometry_state, tv_keyframe, tv_map_point, tv_map_observation, tv_dense_options,
+           tv_odometry_state, tv_keyframe, tv_path_frame, tv_path_pose, tv_map_point,
+           tv_map_observation, tv_dense_options,
            tv_dense_point, tv_depth_options, tv_depth_view, tv_depth_arrays, tv_room_options,
            tv_depth_map, tv_room_state, tv_room_vertex, tv_room_triangle, tv_room_mesh_options,
            tv_room_plane, tv_room_plane_options, tv_room_infer_options]

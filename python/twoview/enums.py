@@ -139,6 +139,13 @@ class OdometryStatus(IntEnum):
     LOST = 4
 
 
+class PathOrigin(IntEnum):
+    UNKNOWN = 0
+    TRACKED = 1
+    TURNED = 2
+    LOCATED = 3
+
+
 class MapReason(IntFlag):
     UNCONFIRMED = 1 << 0
     CONTRADICTED = 1 << 1
@@ -169,6 +176,6 @@ C_PREFIXES = {
     Reason: "TV_REASON_",
     Triangulation: "TV_TRIANGULATION_", PointStatus: "TV_POINT_", Loss: "TV_LOSS_",
     OdometryStatus: "TV_ODOMETRY_", ScaleSource: "TV_SCALE_",
-    MapReason: "TV_MAP_REASON_",
+    MapReason: "TV_MAP_REASON_", PathOrigin: "TV_PATH_",
     RoomPlaneKind: "TV_ROOM_PLANE_",
 }

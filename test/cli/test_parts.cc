@@ -24,7 +24,6 @@
 #include "odometry/flight.h"
 #include "odometry/outputs.h"
 #include "odometry/path_order.h"
-#include "odometry/reach.h"
 #include "odometry/repeated_pictures.h"
 #include "odometry/truth_doubts.h"
 #include "odometry/two_eyes.h"
@@ -942,36 +941,6 @@ void test_times_that_are_frame_numbers_are_understood_and_said() {
   TEST_ASSERT_EQUAL_DOUBLE(3, truth.poses[3].time_s);
 }
 
-// Ten frames a second along x, a tenth of a unit each, of which some have no pose yet.
-std::vector<FlightFrame> flown() {
-  std::vector<FlightFrame> frames(10);
-  for (size_t n = 0; n < frames.size(); ++n) {
-    frames[n].time_s = 0.1 * static_cast<double>(n);
-    frames[n].status = TV_ODOMETRY_TRACKING;
-    frames[n].origin = PoseOrigin::kTracked;
-    frames[n].segment = 0;
-    frames[n].pose.t = {0.1 * static_cast<double>(n), 0, 0};
-  }
-  for (const size_t n : {1, 5, 6, 7, 9}) frames[n].origin = PoseOrigin::kNone;
-  return frames;
-}
-
-void test_a_frame_found_afterwards_is_where_the_camera_can_have_flown(void) {
-  std::vector<FlightFrame> frames = flown();
-  const Reach reach(frames);
-  TEST_ASSERT_TRUE(reach.contains(1, 0, {0.1, 0.02, 0}));
-  TEST_ASSERT_TRUE(reach.contains(6, 0, {0.6, 0.3, 0}));  // two frames from both neighbours
-  TEST_ASSERT_TRUE(reach.contains(9, 0, {0.98, 0, 0}));   // with one on one side alone
-  TEST_ASSERT_FALSE(reach.contains(1, 0, {0.1, 1.1, 0}));
-  TEST_ASSERT_FALSE(reach.contains(6, 0, {0.6, 0.5, 0}));
-  TEST_ASSERT_FALSE(reach.contains(9, 0, {1.3, 0, 0}));
-  TEST_ASSERT_FALSE(reach.contains(7, 0, {0.3, 0, 0}));  // near the one before, not the one after
-  TEST_ASSERT_TRUE(reach.contains(1, 1, {9, 9, 9}));     // a segment of which nothing is tracked
-  // The turn alone was followed: that position is the one of the frame before, and bounds nothing.
-  frames[8].status = TV_ODOMETRY_ROTATION;
-  TEST_ASSERT_TRUE(reach.contains(7, 0, {0.3, 0, 0}));
-}
-
 // A camera that moves by a pixel a picture along a wall with a fine texture; other_by: how far
 // beside it the other eye is, pixels.
 EyesLayout eyes_of(EyesLayout layout, int other_by) {
@@ -1142,7 +1111,6 @@ int main() {
   RUN_TEST(test_the_cloud_has_the_points_whose_rays_meet_at_an_angle);
   RUN_TEST(test_segments_are_counted_that_have_keyframes);
   RUN_TEST(test_the_font_gets_letters_that_it_has);
-  RUN_TEST(test_a_frame_found_afterwards_is_where_the_camera_can_have_flown);
   RUN_TEST(test_the_path_tells_pictures_that_are_in_another_order);
   return UNITY_END();
 }

@@ -13,6 +13,7 @@
 #include "odometry/keyframe.h"
 #include "odometry/loop.h"
 #include "odometry/map.h"
+#include "odometry/path.h"
 #include "odometry/search.h"
 
 namespace {
@@ -254,6 +255,36 @@ void test_velocities_hold_the_scale_of_a_map_in_metres() {
   }
 }
 
+// Ten frames a second along x, a tenth of a unit each, of which 1, 5, 6, 7 and 9 have no pose yet.
+void test_a_frame_found_afterwards_is_where_the_camera_can_have_flown() {
+  begin(TV_CAMERA_PINHOLE);
+  for (const int32_t segment : {0, 1}) {
+    odometry->map.keyframes[add_keyframe(0, segment, 0)].frame = 1000 + segment;
+  }
+  constexpr int kNum = 10;
+  tv_path_frame frames[kNum] = {};
+  for (int n = 0; n < kNum; ++n) {
+    tv_path_frame* frame = &frames[n];
+    *frame = {0.1 * n, n, TV_PATH_TRACKED, 0, 0, {1, 0, 0, 0, 1, 0, 0, 0, 1}, {0.1 * n, 0, 0}};
+    if (n == 1 || n == 9 || (n >= 5 && n <= 7)) frame->origin = TV_PATH_UNKNOWN;
+  }
+  const auto can_be = [&](int32_t idx, int32_t segment, double x, double y) {
+    const tv_path_pose pose = {TV_PATH_LOCATED, segment, {1, 0, 0, 0, 1, 0, 0, 0, 1}, {x, y, 0}};
+    return tv::can_have_flown(odometry->map, frames, kNum, idx, pose);
+  };
+  TEST_ASSERT_TRUE(can_be(1, 0, 0.1, 0.02));
+  TEST_ASSERT_TRUE(can_be(6, 0, 0.6, 0.3));  // two frames from both neighbours
+  TEST_ASSERT_TRUE(can_be(9, 0, 0.98, 0));   // with one on one side alone
+  TEST_ASSERT_FALSE(can_be(1, 0, 0.1, 1.1));
+  TEST_ASSERT_FALSE(can_be(6, 0, 0.6, 0.5));
+  TEST_ASSERT_FALSE(can_be(9, 0, 1.3, 0));
+  TEST_ASSERT_FALSE(can_be(7, 0, 0.3, 0));  // near the one before, not the one after
+  TEST_ASSERT_TRUE(can_be(1, 1, 9, 9));     // of a segment of which nothing is tracked
+  // The turn alone was followed: that position is the one of the frame before, and bounds nothing.
+  frames[8].origin = TV_PATH_TURNED;
+  TEST_ASSERT_TRUE(can_be(7, 0, 0.3, 0));
+}
+
 }  // namespace
 
 extern "C" void setUp(void) { begin(TV_CAMERA_PINHOLE); }
@@ -270,5 +301,6 @@ int main() {
   RUN_TEST(test_a_map_is_added_in_the_places_of_points_that_are_gone);
   RUN_TEST(test_the_error_of_a_depth_is_that_of_a_distance_in_a_fisheye);
   RUN_TEST(test_velocities_hold_the_scale_of_a_map_in_metres);
+  RUN_TEST(test_a_frame_found_afterwards_is_where_the_camera_can_have_flown);
   return UNITY_END();
 }

@@ -10,6 +10,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <set>
+#include <tuple>
 #include <utility>
 
 #include "base/error.h"
@@ -263,6 +264,7 @@ void Flight::give(const SourceFrame& frame, FlightFrame& record) {
   record.time_ms = cpu_ms() - before;
   gap_ = false;
   add_still_mask();
+  check(tv_path_record(&state_, frame.time_s, &record.known), "frame " + frame.name);
   record.status = state_.status;
   record.reasons = state_.reasons;
   record.map_reasons = state_.map_reasons;
@@ -279,8 +281,6 @@ void Flight::give(const SourceFrame& frame, FlightFrame& record) {
     record.live_metric = state_.scale_source != TV_SCALE_UNIT;
     record.live_scale_sigma = state_.scale_sigma;
     record.live = pose_of(state_.world_from_cam_R, state_.world_from_cam_t);
-    record.reference_id = state_.reference_id;
-    record.reference_from_cam = pose_of(state_.reference_from_cam_R, state_.reference_from_cam_t);
   }
 }
 
@@ -331,40 +331,34 @@ void Flight::finish(const std::atomic<bool>& stop) {
   check(tv_odometry_finish(odometry_), "the map");
   check(tv_odometry_camera(odometry_, &camera_), "the camera");
   for (FlightFrame& frame : frames_) {
-    if (frame.reference_id < 0) continue;
-    double R[9], t[3];
-    const Pose& relative = frame.reference_from_cam;
-    const tv_status status = tv_odometry_pose_of(odometry_, frame.reference_id, relative.R.data(),
-                                                 relative.t.data(), R, t, &frame.segment);
-    if (status == TV_ERR_ARGUMENT) continue;  // its segment was wrong, and was removed
-    check(status, "frame " + frame.name);
-    frame.pose = pose_of(R, t);
+    const auto [pose, segment] = pose_now(frame.known);
+    if (segment < 0) continue;  // also where its segment was wrong, and was removed
+    frame.pose = pose;
+    frame.segment = segment;
     frame.origin = PoseOrigin::kTracked;
   }
-  std::map<int, FlightFrame*> missing;
-  std::map<int, int> without_picture;  // the source's index and the number of the given frame
+  std::map<int, size_t> missing;       // the source's index and the number of the given frame
+  std::map<int, int> without_picture;  // the same
   const std::vector<FlightKeyframe> keyframes = this->keyframes();
-  // The first keyframe of a segment became one only when a later frame completed the start.
   for (const FlightKeyframe& key : keyframes) {
     FlightFrame& frame = frames_[index_given(key.keyframe.frame)];
     frame.is_keyframe = true;
     if (thumbnail(key.keyframe.frame) == nullptr) without_picture[frame.index] = key.keyframe.frame;
-    if (frame.origin != PoseOrigin::kNone) continue;
-    frame.origin = PoseOrigin::kTracked;
-    frame.segment = key.keyframe.segment;
-    frame.pose = pose_of(key.keyframe.world_from_cam_R, key.keyframe.world_from_cam_t);
   }
   settle_repeated();
   if (!source_.can_run_again() || keyframes.empty()) return;
-  // A frame that was followed by its turn alone has the position of the frame before it.
-  for (FlightFrame& frame : frames_) {
+  std::vector<tv_path_frame> path;
+  for (size_t number = 0; number < given_.size(); ++number) {
+    const FlightFrame& frame = frames_[given_[number]];
+    path.push_back(frame.known);
+    // A frame that was followed by its turn alone has the position of the frame before it.
     const bool is_known = frame.origin != PoseOrigin::kNone && frame.status != TV_ODOMETRY_ROTATION;
-    if (!is_known && !frame.unreadable && !frame.is_repeated) missing[frame.index] = &frame;
+    if (!is_known && !frame.is_repeated) missing[frame.index] = number;
+    if (frame.is_repeated) path.back().origin = TV_PATH_UNKNOWN;
   }
   int last = missing.empty() ? -1 : missing.rbegin()->first;
   if (!without_picture.empty()) last = std::max(last, without_picture.rbegin()->first);
   if (last < 0) return;
-  const Reach reach(frames_);
   const auto wanted = [&](int index) {
     return missing.count(index) != 0 || without_picture.count(index) != 0;
   };
@@ -373,17 +367,11 @@ void Flight::finish(const std::atomic<bool>& stop) {
     if (picture != without_picture.end() && !frame.luma.empty())
       thumbnails_[picture->second] = thumbnail_of(frame.luma);
     const auto found = missing.find(frame.index);
-    if (found != missing.end() && !frame.luma.empty()) {
-      const auto nearest = std::min_element(keyframes.begin(), keyframes.end(),
-                                            [&](const FlightKeyframe& a, const FlightKeyframe& b) {
-                                              return std::abs(a.keyframe.time_s - frame.time_s) <
-                                                     std::abs(b.keyframe.time_s - frame.time_s);
-                                            });
-      locate(frame, *found->second, nearest->keyframe.id, reach);
-    }
+    if (found != missing.end() && !frame.luma.empty()) locate(frame, path, found->second);
     return frame.index < last;
   };
   source_.run(wanted, consume, stop);
+  settle_waited();
 }
 
 void Flight::settle_repeated() {
@@ -393,6 +381,11 @@ void Flight::settle_repeated() {
     frames_[n].origin = PoseOrigin::kNone;
     frames_[n].segment = -1;
   }
+  settle_waited();
+}
+
+// A picture of a camera that stood still is where the one before it is.
+void Flight::settle_waited() {
   for (const size_t n : repeated_.waited()) {
     FlightFrame& frame = frames_[n];
     if (!frame.withheld) continue;
@@ -415,25 +408,27 @@ std::string Flight::repeated_note() const {
          (count == 1 ? "it has" : "they have") + " no pose";
 }
 
-void Flight::locate(SourceFrame frame, FlightFrame& record, int32_t near_id, const Reach& reach) {
+void Flight::locate(SourceFrame frame, std::vector<tv_path_frame>& path, size_t number) {
   try {
     prepare(frame);
   } catch (const BadInput&) {
     return;
   }
-  tv_odometry_state state;
-  tv_odometry_state_init(&state);
   const tv_image image = view_of(frame.luma), mask = view_of(mask_);
-  check(tv_odometry_locate(odometry_, &image, &mask, near_id, &state), "frame " + frame.name);
-  // A weak pose that nothing before or after confirms is not written as known.
-  if (state.status != TV_ODOMETRY_TRACKING || !state.has_pose) return;
-  if (record.origin != PoseOrigin::kNone && state.segment != record.segment) return;
-  const Pose pose = pose_of(state.world_from_cam_R, state.world_from_cam_t);
-  const auto index = static_cast<size_t>(&record - frames_.data());
-  if (!reach.contains(index, state.segment, pose.t)) return;
+  int32_t is_found = 0;
+  check(tv_path_locate(odometry_, path.data(), static_cast<int32_t>(path.size()),
+                       static_cast<int32_t>(number), &image, &mask, &is_found),
+        "frame " + frame.name);
+  if (is_found == 0) return;
+  FlightFrame& record = frames_[given_[number]];
+  std::tie(record.pose, record.segment) = pose_now(path[number]);
   record.origin = PoseOrigin::kLocated;
-  record.segment = state.segment;
-  record.pose = pose;
+}
+
+std::pair<Pose, int32_t> Flight::pose_now(const tv_path_frame& frame) const {
+  tv_path_pose now;
+  check(tv_path_poses(odometry_, &frame, 1, &now), "the path");
+  return {pose_of(now.world_from_cam_R, now.world_from_cam_t), now.segment};
 }
 
 const Thumbnail* Flight::thumbnail(int number) const {

@@ -15,7 +15,6 @@
 #include "odometry/flight_frame.h"
 #include "odometry/frames.h"
 #include "odometry/poses.h"
-#include "odometry/reach.h"
 #include "odometry/repeated_pictures.h"
 #include "odometry/two_eyes.h"
 #include "twoview/odometry.h"
@@ -87,6 +86,8 @@ class Flight {
   const FlightFrame& given(int number) const {
     return frames_[given_[static_cast<size_t>(number)]];
   }
+  // The pose of a frame in the last state of the map, and its segment, -1 where it has none.
+  std::pair<Pose, int32_t> pose_now(const tv_path_frame& frame) const;
   size_t index_given(int number) const { return given_[static_cast<size_t>(number)]; }
   // The picture of a frame that was given and became a keyframe; null for other frames.
   const Thumbnail* thumbnail(int number) const;
@@ -164,11 +165,13 @@ class Flight {
   void give(const SourceFrame& frame, FlightFrame& record);
   // Of frames whose picture was repeated, what the pictures after them say.
   void settle_repeated();
+  void settle_waited();
   // Says what was found of the frame that was given last.
   void tell_source();
   void add_still_mask();
   void keep_colours(const SourceFrame& frame);
-  void locate(SourceFrame frame, FlightFrame& record, int32_t near_id, const Reach& reach);
+  // Looks for the frame that was given after `number` others in the finished map.
+  void locate(SourceFrame frame, std::vector<tv_path_frame>& path, size_t number);
 
   FrameSource& source_;
   FlightOptions options_;

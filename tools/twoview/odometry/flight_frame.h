@@ -7,6 +7,7 @@
 
 #include "odometry/poses.h"
 #include "twoview/odometry.h"
+#include "twoview/path.h"
 
 namespace cli {
 
@@ -34,8 +35,8 @@ struct FlightFrame {
   bool live_metric = false;  // whether the map's unit was the metre then
   double live_scale_sigma = 0;
   Pose live;
-  int32_t reference_id = -1;
-  Pose reference_from_cam;
+  // What gives its pose in any state of the map; number -1: it was not given to the tracker.
+  tv_path_frame known{0, -1, TV_PATH_UNKNOWN, -1, 0, {}, {}};
   // The pose in the last state of the map, and how it was found; segment -1: none.
   PoseOrigin origin = PoseOrigin::kNone;
   int32_t segment = -1;

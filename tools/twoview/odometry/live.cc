@@ -70,22 +70,12 @@ void append(Json& list, const double* v) {
 // Where a frame sees the points of the map, by the ids of the points.
 using Sightings = std::map<int32_t, std::pair<float, float>>;
 
-// Writes the frame's position in the last state of the map, and its segment. False without a pose.
-bool position_of(const Flight& flight, const FlightFrame& frame, double t[3], int32_t* segment) {
-  double R[9];
-  return frame.reference_id >= 0 &&
-         tv_odometry_pose_of(flight.odometry(), frame.reference_id,
-                             frame.reference_from_cam.R.data(), frame.reference_from_cam.t.data(),
-                             R, t, segment) == TV_OK;
-}
-
 // The segment of the newest frame that has a pose in the last state of the map, or -1.
 int32_t newest_segment(const Flight& flight) {
   const std::vector<FlightFrame>& frames = flight.frames();
-  double t[3];
-  int32_t segment = -1;
   for (size_t k = frames.size(); k > 0; --k)
-    if (position_of(flight, frames[k - 1], t, &segment)) return segment;
+    if (const int32_t segment = flight.pose_now(frames[k - 1].known).second; segment >= 0)
+      return segment;
   return -1;
 }
 
@@ -359,10 +349,8 @@ Snapshot LivePage::State::snapshot_of(const Flight& flight) {
   made.view = view;
   const size_t step = frames.size() / kMaxPath + 1;
   for (size_t k = (frames.size() - 1) % step; k < frames.size(); k += step) {
-    Vector3 t{};
-    int32_t own = -1;
-    if (position_of(flight, frames[k], t.data(), &own) && own == made.segment)
-      made.path.push_back(t);
+    const auto [pose, own] = flight.pose_now(frames[k].known);
+    if (own >= 0 && own == made.segment) made.path.push_back(pose.t);
   }
   return made;
 }

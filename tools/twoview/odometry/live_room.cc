@@ -27,15 +27,9 @@ cv::Mat small_copy(const cv::Mat& picture, const cv::Size& size, int interpolati
 }
 
 // Where a frame is in the last state of the map; null where it is not in that segment.
-std::optional<Pose> pose_in(const Flight& flight, int32_t reference_id,
-                            const Pose& reference_from_cam, int32_t segment) {
-  Pose pose;
-  int32_t own = -1;
-  if (tv_odometry_pose_of(flight.odometry(), reference_id, reference_from_cam.R.data(),
-                          reference_from_cam.t.data(), pose.R.data(), pose.t.data(),
-                          &own) != TV_OK ||
-      own != segment)
-    return {};
+std::optional<Pose> pose_in(const Flight& flight, const tv_path_frame& frame, int32_t segment) {
+  const auto [pose, own] = flight.pose_now(frame);
+  if (own != segment) return {};
   return pose;
 }
 
@@ -61,7 +55,7 @@ bool LiveRoom::keep(const Flight& flight) {
   }
   const FlightFrame& frame = flight.frames().back();
   Kept kept;
-  kept.tie = {frame.reference_id, frame.reference_from_cam};
+  kept.known = frame.known;
   kept.view = {frame.index, frame.name, frame.live.R, frame.live.t, false, frame.time_s};
   if (!kept_.empty() && !is_elsewhere(kept_.back().view, kept.view, median_depth_)) return false;
   const cv::Size size = shrunk_size(flight.picture().size(), kLongerSide);
@@ -83,8 +77,8 @@ std::vector<PreviewPlace> LiveRoom::places(const Flight& flight, int32_t segment
   std::vector<PreviewPlace> found;
   for (const Placed& placed : placed_) {
     const auto& [key, partner, distance] = placed;
-    const auto at = pose_in(flight, key.reference_id, key.reference_from_cam, segment);
-    const auto other = pose_in(flight, partner.reference_id, partner.reference_from_cam, segment);
+    const auto at = pose_in(flight, key, segment);
+    const auto other = pose_in(flight, partner, segment);
     found.emplace_back();
     if (!at || !other) continue;
     found.back() = {true, at->R, at->t, distance_between(*at, *other) / distance};
@@ -106,7 +100,7 @@ std::optional<LiveRoom::Job> LiveRoom::next(const Flight& flight) {
   std::vector<const Kept*> kept;  // of each view
   size_t key = 0;
   for (const Kept& one : kept_) {
-    const auto pose = pose_in(flight, one.tie.reference_id, one.tie.reference_from_cam, segment_);
+    const auto pose = pose_in(flight, one.known, segment_);
     if (&one == &candidate) {
       if (!pose) return {};
       key = scene.views.size();
@@ -128,14 +122,14 @@ std::optional<LiveRoom::Job> LiveRoom::next(const Flight& flight) {
   std::vector<size_t> chosen = choose_partners(scene, key, median_depth_);
   if (chosen.empty()) return {};
   chosen.insert(chosen.begin(), key);
-  Placed placed{kept[key]->tie, {}, 0};
+  Placed placed{kept[key]->known, {}, 0};
   for (const size_t k : chosen) {
     job.key.views.push_back(scene.views[k]);
     job.key.pictures.push_back(kept[k]->picture);
     const double distance = distance_between({scene.views[key].R, scene.views[key].t},
                                              {scene.views[k].R, scene.views[k].t});
     if (distance <= placed.distance) continue;
-    placed.partner = kept[k]->tie;
+    placed.partner = kept[k]->known;
     placed.distance = distance;
   }
   placed_.push_back(placed);

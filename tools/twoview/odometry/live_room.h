@@ -27,19 +27,14 @@ class LiveRoom {
   void forget_pictures();
 
  private:
-  // How a frame is fixed to a keyframe of the map.
-  struct Tie {
-    int32_t reference_id = -1;
-    Pose reference_from_cam;
-  };
   struct Kept {
-    Tie tie;
+    tv_path_frame known;
     RoomView view;  // as it was when the frame was tracked
     RoomPicture picture;
   };
   // A keyframe of the room, and the partner that is farthest from it.
   struct Placed {
-    Tie key, partner;
+    tv_path_frame key, partner;
     double distance = 0;  // between both when the depth map was made
   };
 

@@ -21,7 +21,7 @@ LIBRARY = [
     "bundle",
     "absolute_pose",
     "window",
-    "odometry",
+    "odometry", "path",
     "status",
     "version",
     "alloc",
