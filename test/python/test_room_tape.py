@@ -60,6 +60,16 @@ class TestTape(unittest.TestCase):
         _, sure = measured(1.02, 1 / 1.02, scale_sigma=0.001)
         self.assertLess(sure["within_2_sigma"], 0.9)
 
+    def test_a_ray_that_meets_a_surface_flatly_knows_less(self):
+        normal, flat = np.array([1.0, 0, 0]), np.array([0.5, 0.75 ** 0.5, 0])  # 60 degrees
+        ends = [[tape.Pick(None, np.array([0, y, 0.0]), normal, 0.01, ray) for y in (0.0, 2.0)]
+                for ray in (normal, flat)]
+        across = 2 * 0.015 ** 2  # half a voxel at both ends
+        for (one, other), along in zip(ends, (0, 0.01 * 0.75 ** 0.5 / 0.5)):
+            length, sigma = tape.length_between(one, other, 0.03, 0)
+            self.assertAlmostEqual(length, 2)
+            self.assertAlmostEqual(sigma, (across + 2 * along ** 2) ** 0.5)
+
     def test_a_mark_has_no_edge_around_it(self):
         # The box's front ends at the corner that is nearest to the eye, and then the wall is seen.
         eye = np.array([-1.0, 0.0, 1.0])

@@ -158,7 +158,7 @@
     });
   }
 
-  // What a pixel of the canvas shows: {place, normal, sigma}, or null.
+  // What a pixel of the canvas shows: {place, ray, normal, sigma}, or null. ray: from the eye to it.
   function pick(x, y) {
     const target = bufferOf(canvas.clientWidth, canvas.clientHeight);
     rasterize(target);
@@ -169,22 +169,25 @@
     const frame = camera(), depth = 1 / target.near[at];
     const focal = (view.walks ? 0.62 : 1.0) * Math.min(target.width, 1.5 * target.height);
     const u = (column - target.width / 2) / focal, v = (row - target.height / 2) / focal;
-    const found = [0, 1, 2].map((k) => frame.eye[k] +
-      depth * (frame.forward[k] + u * frame.right[k] + v * frame.down[k]));
+    const ray = [0, 1, 2].map((k) => frame.forward[k] + u * frame.right[k] + v * frame.down[k]);
+    const found = ray.map((value, k) => frame.eye[k] + depth * value);
     const vertex = corners[t];
-    return { place: found, normal: Array.from(normals.subarray(3 * vertex, 3 * vertex + 3)),
+    return { place: found, ray, normal: Array.from(normals.subarray(3 * vertex, 3 * vertex + 3)),
              sigma: data.sigma_step * sigmas[vertex] };
   }
 
-  // The distance of two places with its standard deviation: of the surface along its normal, of
-  // half a voxel across it (a surface of voxels has no sharper edges), and of the scale.
+  // The distance of two places with its standard deviation: of the surface along its normal, which
+  // moves what a ray meets along the ray, of half a voxel across it (a surface of voxels has no
+  // sharper edges), and of the scale.
   function measure(a, b) {
+    const dot = (p, q) => p.reduce((sum, value, k) => sum + value * q[k], 0);
     const way = a.place.map((value, k) => b.place[k] - value), distance = Math.hypot(...way);
     let variance = Math.pow(distance * data.scale_sigma, 2);
     for (const end of [a, b]) {
-      const cosine = distance ? Math.abs(way.reduce((sum, value, k) =>
-        sum + value * end.normal[k], 0)) / distance : 1;
-      variance += Math.pow(end.sigma * cosine, 2) +
+      const cosine = distance ? Math.abs(dot(way, end.normal)) / distance : 1;
+      const along = distance ? Math.abs(dot(way, end.ray)) / distance : Math.hypot(...end.ray);
+      const facing = Math.abs(dot(end.ray, end.normal));
+      variance += Math.pow(end.sigma * along / Math.max(facing, 0.2 * Math.hypot(...end.ray)), 2) +
         Math.pow(data.voxel / 2, 2) * Math.max(0, 1 - cosine * cosine);
     }
     return { distance, sigma: Math.sqrt(variance), rise: Math.abs(way[2]) };

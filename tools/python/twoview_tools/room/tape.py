@@ -25,6 +25,7 @@ class Pick:
     place: np.ndarray  # where the model has it, in the model's frame and unit
     normal: np.ndarray
     sigma: float  # of the surface along its normal
+    ray: np.ndarray  # of length 1, on which it was picked, in the model's frame
 
 
 def nearest_views(boxes, points, camera, rotations, centres):
@@ -101,7 +102,7 @@ def picks_of(surface, boxes, points, camera, true_poses, poses, seed=5):
         ray = poses[0][k] @ true_poses[0][k].T @ (way / distance)
         hit = surface.first_hit(poses[1][k], ray)
         if hit is not None:
-            found.append(Pick(point, *hit))
+            found.append(Pick(point, *hit, ray))
     return found
 
 
@@ -112,7 +113,8 @@ def length_between(one, other, voxel, scale_sigma):
     variance = (length * scale_sigma) ** 2
     for end in (one, other):
         cosine = abs(way @ end.normal) / length
-        variance += (end.sigma * cosine) ** 2 + (voxel / 2) ** 2 * max(0, 1 - cosine ** 2)
+        along = abs(way @ end.ray) / length / max(abs(end.ray @ end.normal), 0.2)
+        variance += (end.sigma * along) ** 2 + (voxel / 2) ** 2 * max(0, 1 - cosine ** 2)
     return length, np.sqrt(variance)
 
 
