@@ -150,8 +150,11 @@ YAML::Node parse_yaml(const std::string& text, const std::string& file) {
     std::istringstream stream(body);
     StrictReader reader;
     YAML::Parser parser(stream);
-    while (parser.HandleNextDocument(reader)) {
-    }
+    // A document takes a line at least. Of a text that is damaged yaml-cpp may find more of them
+    // without an end.
+    auto lines = std::count(body.begin(), body.end(), '\n') + 1;
+    while (parser.HandleNextDocument(reader))
+      if (lines-- == 0) throw BadInput(file + ": no YAML, whose documents (---) have an end");
     const std::vector<YAML::Node> documents = YAML::LoadAll(body);
     if (!documents.empty()) root = documents[0];
     refuse_documents(documents, file);
