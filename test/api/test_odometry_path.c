@@ -168,6 +168,8 @@ static void test_a_frame_is_not_found_where_the_camera_cannot_have_flown(void) {
 }
 
 static void test_bad_arguments_change_nothing(void) {
+  static _Alignas(8) uint8_t shared[ROOM_WIDTH * ROOM_HEIGHT]; /* a picture, and a record in it */
+  tv_image mask = image;
   tv_path_frame before[20];
   tv_odometry_state bad;
   int32_t is_found = 7;
@@ -202,6 +204,18 @@ static void test_bad_arguments_change_nothing(void) {
   image.width -= 1;
   TEST_ASSERT_EQUAL_INT(TV_ERR_CAMERA, LOCATE(odometry, frames, 20, 0, &image, &is_found));
   image.width += 1;
+  image.height = -image.height; /* a picture that has no bytes overlaps nothing */
+  TEST_ASSERT_EQUAL_INT(TV_ERR_CAMERA, LOCATE(odometry, frames, 20, 0, &image, &is_found));
+  image.height = -image.height;
+  memcpy(shared, frames, sizeof frames[0]);
+  mask.data = shared;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_path_locate(odometry, (tv_path_frame *)(void *)shared, 1,
+                                                       0, &image, &mask, &is_found));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_path_locate(odometry, (tv_path_frame *)(void *)shared, 1,
+                                                       0, &mask, NULL, &is_found));
+  image.data = NULL;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, LOCATE(odometry, frames, 20, 0, &image, &is_found));
+  image.data = pixels;
   frames[7].frame = frames[6].frame;
   TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_path_poses(odometry, frames, 20, poses));
   TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, LOCATE(odometry, frames, 20, 0, &image, &is_found));

@@ -29,6 +29,15 @@ void keep_pose(const tv_odometry_state& state, int32_t origin, tv_path_frame* fr
   std::copy_n(state.reference_from_cam_t, 3, frame->reference_from_cam_t);
 }
 
+// Whether the frames, which are written, share a byte with the pictures or with is_found.
+bool overlaps(const tv_path_frame* frames, size_t bytes, const tv_image& image,
+              const tv_image* mask, const int32_t* is_found) {
+  return overlap(frames, bytes, is_found, sizeof *is_found) ||
+         overlap(frames, bytes, image.data, image_bytes(image)) ||
+         (mask != nullptr && mask->data != nullptr &&
+          overlap(frames, bytes, mask->data, image_bytes(*mask)));
+}
+
 // The id of the keyframe whose frame is nearest by its number; -1 without any.
 int32_t nearest_keyframe(const Map& map, int32_t frame) {
   int32_t id = -1, least = 0;
@@ -79,18 +88,13 @@ tv_status tv_path_locate(tv_odometry* odometry, tv_path_frame* frames, int32_t n
   tv_status status = tv::check_frames(frames, num_frames);
   if (status != TV_OK) return status;
   if (!tv::within(idx, 0, num_frames - 1)) return TV_ERR_ARGUMENT;
-  const size_t bytes = tv::bytes_of(num_frames);
-  if (tv::overlap(is_found, sizeof *is_found, frames, bytes) ||
-      tv::overlap(frames, bytes, image, sizeof *image) ||
-      tv::overlap(frames, bytes, image->data, tv::image_bytes(*image))) {
-    return TV_ERR_OVERLAP;
-  }
   const tv::Map& map = odometry->map;
   tv_odometry_state state;
   tv_odometry_state_init(&state);
   const int32_t near_id = tv::nearest_keyframe(map, frames[idx].frame);
-  status = tv_odometry_locate(odometry, image, mask, near_id, &state);
+  status = tv_odometry_locate(odometry, image, mask, near_id, &state);  // checks the pictures
   if (status != TV_OK) return status;
+  if (tv::overlaps(frames, tv::bytes_of(num_frames), *image, mask, is_found)) return TV_ERR_OVERLAP;
   *is_found = 0;
   // A weak pose that nothing before or after confirms is not kept as known.
   if (state.status != TV_ODOMETRY_TRACKING) return TV_OK;

@@ -148,7 +148,7 @@ bool contribution(const Fusion& f, const Vec3& point, bool near, Voxel* added) {
   return true;
 }
 
-// Adds the view to a block, sign 1, or subtracts it, sign -1.
+// Adds the view to a block, or subtracts it. near: the block is one of those around its surface.
 void fuse_block(const Fusion& f, int32_t index, bool near, bool subtract) {
   const BlockPlace place = place_of(f.room.blocks[index].key);
   const Mat3& R = f.view.rotation;

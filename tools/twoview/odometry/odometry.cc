@@ -1,6 +1,5 @@
 // twoview odometry SOURCE -o OUT: the frames of one camera to its path and a map.
 
-#include "base/median.h"
 #include "odometry/odometry_verb.h"
 
 #include <CLI/CLI.hpp>
@@ -11,6 +10,7 @@
 #include <opencv2/core.hpp>
 
 #include "base/error.h"
+#include "base/median.h"
 #include "base/output.h"
 #include "base/terminal.h"
 #include "files/camera_file.h"
@@ -656,17 +656,16 @@ int odometry(Arguments& a) {
 #endif
   was_stopped = was_stopped || stop;
   const bool has_map = !result.keyframes.empty();
-  FrameSource& pictures =
+  FrameSource* pictures = source.get();  // from which they can be read again
 #ifdef TWOVIEW_HAS_ROOM
-      kept ? static_cast<FrameSource&>(*kept) :
+  if (kept) pictures = &*kept;
 #endif
-           *source;
   ColmapFolder colmap(files.folder() / "colmap", {camera_path(a.camera), truth_file}, has_map);
   if (has_map) colmap.add_model(result);
   if (has_map) note_blanks(result, common);
   if (has_map && !a.leaves_pictures) {
     const Stopwatch watch(!common.quiet, "writing the pictures of the keyframes");
-    for (const std::string& note : colmap.add_pictures(result, pictures, stop)) common.note(note);
+    for (const std::string& note : colmap.add_pictures(result, *pictures, stop)) common.note(note);
   }
   result.json["colmap_pictures"] = colmap.pictures_json();
   result.json["focal_length"] = lens ? lens->json() : nlohmann::ordered_json(nullptr);
