@@ -34,7 +34,7 @@ def test_a_walls_points_are_on_the_wall_within_their_sigma(pair):
     assert (points["grey"] == pair[0][y, x]).all()
     shift = points["pixel0"] - points["pixel1"]
     assert np.abs(np.median(shift, axis=0) - [SHIFT, 0]).max() < 0.1
-    assert (points["similarity"] > 0.5).all()
+    assert (points["similarity"] > 0.7).all()
 
 
 def test_the_range_comes_from_sparse_points_and_the_number_is_bounded(pair):

@@ -8,10 +8,10 @@ namespace {
 
 constexpr int32_t kReach = TVK_DENSE_REACH, kRows = 2 * kReach + 2;
 constexpr int32_t kStretch = TVK_DENSE_STRETCH;
-// Of a window of 5 x 5 cells, those that have the step of the middle to within one: the majority.
-constexpr int32_t kLeastSupport = 13;
-// Windows that are less alike than this show different things: a correlation of 0.5.
-constexpr uint8_t kLeastSimilarity = 128;
+// Of a window of 5 x 5 cells, those that have the step of the middle to within one.
+constexpr int32_t kLeastSupport = 14;
+// Windows that are less alike than this show different things: a correlation of 0.7.
+constexpr uint8_t kLeastSimilarity = 179;
 // The variance of the residuals is multiplied by 4, since residuals of neighbouring pixels are
 // correlated; without texture the mean step of the neighbours has a standard deviation of 0.35
 // steps; and a floor of 0.12 steps stands for what the model leaves out (measured:
