@@ -19,6 +19,10 @@ def truth_at(times):
     return "".join(f"{t:.9f} {0.1 * i} 0 0 0 0 0 1\n" for i, t in enumerate(times))
 
 
+def rows_of(luma):
+    return [luma[y * WIDTH:(y + 1) * WIDTH] for y in range(HEIGHT)]
+
+
 def turned(luma, width, height, degrees):
     """(the bytes, the width, the height) of a picture turned clockwise."""
     rows = [luma[y * width:(y + 1) * width] for y in range(height)]
@@ -87,12 +91,19 @@ class Films(CliTest):
         for time, true in zip(self.times(), UNEVEN[0:18:2]):
             self.assertAlmostEqual(time, true, 4)
 
-    def test_a_picture_that_repeats_a_time_is_left_out(self):
+    def test_a_picture_of_a_time_that_was_or_of_another_size_is_left_out(self):
         times = list(TIMES)
         times[5] = times[4]
-        result = self.track(mov(PICTURES, times), truth=truth_at(TIMES))
-        self.assertEqual(result["film"]["num_left_out"], 1)
-        self.assertEqual(result["num_frames"], COUNT - 1)
+        pictures = list(PICTURES)
+        half = [row[::2] for row in rows_of(LUMA[9])[::2]]
+        pictures[9] = png(WIDTH // 2, HEIGHT // 2, b"".join(half))
+        result = self.track(mov(pictures, times), truth=truth_at(TIMES))
+        film = result["film"]
+        self.assertEqual((film["num_left_out"], film["num_other_size"]), (1, 1))
+        self.assertEqual(result["num_frames"], COUNT - 2)
+        self.assertLess(result["truth"]["ate_rmse_percent_of_path"], 1)
+        self.assertIn("1 picture of the film is left out: of another size (160x120) than the "
+                      "film's 320x240", result["notes"])
         self.assertIn("1 picture of the film is left out", " ".join(result["notes"]))
 
     def test_pictures_that_are_given_again_while_the_camera_moves_have_no_pose(self):

@@ -116,6 +116,7 @@ std::vector<std::string> read_video_file(const std::string& path, const TakeFram
     throw BadInput("video " + path + " ends early, after " + std::to_string(index) + " of " +
                    std::to_string(std::llround(promised)) +
                    " frames: copy or record it again, or save its good frames as images");
+  if (const std::string words = other_size_words(facts); !words.empty()) notes.push_back(words);
   return notes;
 }
 

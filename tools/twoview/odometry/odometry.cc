@@ -236,13 +236,21 @@ nlohmann::ordered_json options_of(const Arguments& a, const std::string& truth_f
 
 nlohmann::ordered_json film_json(const std::optional<FilmFacts>& film) {
   if (!film) return nullptr;
-  return {{"times", times_name(film->times)},    {"rate_hz", film->rate_hz},
-          {"variable_rate", film->is_variable},  {"clock_start_s", film->clock_start_s},
-          {"num_left_out", film->num_left_out},  {"num_begun_anew", film->num_begun_anew},
-          {"size", {film->width, film->height}}, {"rotation_deg", film->turn_deg},
-          {"mirrored", film->is_mirrored},       {"pixel_aspect", film->pixel_aspect},
-          {"interlaced", film->is_interlaced},   {"joined", film->is_joined},
-          {"num_damaged", film->num_damaged},    {"num_decoder_errors", film->num_decoder_errors}};
+  return {{"times", times_name(film->times)},
+          {"rate_hz", film->rate_hz},
+          {"variable_rate", film->is_variable},
+          {"clock_start_s", film->clock_start_s},
+          {"num_left_out", film->num_left_out},
+          {"num_other_size", film->num_other_size},
+          {"num_begun_anew", film->num_begun_anew},
+          {"size", {film->width, film->height}},
+          {"rotation_deg", film->turn_deg},
+          {"mirrored", film->is_mirrored},
+          {"pixel_aspect", film->pixel_aspect},
+          {"interlaced", film->is_interlaced},
+          {"joined", film->is_joined},
+          {"num_damaged", film->num_damaged},
+          {"num_decoder_errors", film->num_decoder_errors}};
 }
 
 // The camera that was estimated, as a file for the next flight. One that is doubtful is not

@@ -79,7 +79,8 @@ struct Film::State {
   double clock_s = 0;  // the container's time of the picture before, from first_s on
   double time_s = 0;
   int64_t index = -1, num_pictures = 0;
-  std::vector<double> times;  // of the container, where OpenCV does not say a picture's
+  std::unique_ptr<FilmPackets> packets;  // read as far as the pictures
+  std::vector<double> times;             // of the container, where OpenCV does not say a picture's
 
   double time_of_picture() {
     if (facts.times != FilmFacts::Times::kContainer) return static_cast<double>(index) * step_s;
@@ -88,6 +89,7 @@ struct Film::State {
     return (position == 0 && index > 0 ? next_container_time() : position) - first_s;
   }
   double next_container_time();
+  bool is_other_size();
   void add_interval(double interval_s);
   double mean_interval_s() const;
   void end();
@@ -101,6 +103,19 @@ double Film::State::next_container_time() {
   const auto next = std::find_if(times.begin(), times.end(),
                                  [&](double time) { return time > last + kClockUnit_s; });
   return next == times.end() ? last : *next;
+}
+
+// Whether the picture is of another size than the header's. A film may have more packets than
+// pictures (two fields, frames that are not shown), and so a clock says how far to read them.
+bool Film::State::is_other_size() {
+  const bool has_clock = facts.times == FilmFacts::Times::kContainer;
+  while (packets->num() <= index ||
+         (has_clock && packets->time_s() < clock_s + first_s - kClockUnit_s))
+    if (!packets->next()) break;
+  const int width = packets->width(), height = packets->height();
+  if (width == 0 || (width == container.width && height == container.height)) return false;
+  if (facts.num_other_size++ == 0) facts.other_width = width, facts.other_height = height;
+  return true;
 }
 
 void Film::State::add_interval(double interval_s) {
@@ -125,9 +140,9 @@ void Film::State::end() {
   const DecoderErrors errors = decoder_errors();
   facts.num_decoder_errors = errors.num;
   facts.decoder_error = errors.first;
-  const PacketCounts packets = count_packets(path);
-  facts.num_packets = packets.num;
-  facts.num_damaged = packets.num_damaged;
+  while (packets->next()) continue;
+  facts.num_packets = packets->num();
+  facts.num_damaged = packets->num_damaged();
 }
 
 Film::Film(const std::string& path, double fps) : state_(std::make_unique<State>()) {
@@ -167,6 +182,7 @@ Film::Film(const std::string& path, double fps) : state_(std::make_unique<State>
     s.facts.times = FilmFacts::Times::kRate;
     s.step_s = 1 / s.container.rate_hz;
   }
+  s.packets = std::make_unique<FilmPackets>(path);
   listen_to_decoders();
 }
 
@@ -174,15 +190,19 @@ Film::~Film() = default;
 
 bool Film::next() {
   State& s = *state_;
+  bool follows_other_size = false;
   while (s.capture.grab()) {
     ++s.index;
     const double clock_s = s.time_of_picture();
     const std::optional<double> time_s = s.clock.next(clock_s);
     s.clock_s = clock_s;
     s.facts.num_left_out = s.clock.num_left_out();
-    if (!time_s) continue;
+    const bool is_other_size = s.is_other_size();
+    follows_other_size = follows_other_size || is_other_size;
+    if (is_other_size || !time_s) continue;
     s.facts.num_begun_anew = s.clock.num_begun_anew();
-    if (s.num_pictures > 0 && !s.clock.began_anew()) s.add_interval(*time_s - s.time_s);
+    if (s.num_pictures > 0 && !s.clock.began_anew() && !follows_other_size)
+      s.add_interval(*time_s - s.time_s);
     s.time_s = *time_s;
     ++s.num_pictures;
     if (const double interval_s = s.mean_interval_s();
@@ -231,6 +251,7 @@ std::vector<std::string> Film::notes() const {
         std::to_string(f.num_left_out) +
         (f.num_left_out == 1 ? " picture of the film is" : " pictures of the film are") +
         " left out: no later than the one before, by the container's times");
+  if (const std::string words = other_size_words(f); !words.empty()) notes.push_back(words);
   if (const std::string note = s.clock.note("the film"); !note.empty()) notes.push_back(note);
   if (f.clock_start_s > 1e-3 && f.times == FilmFacts::Times::kContainer)
     notes.push_back("the film's clock begins at " + text_of("%.6g", f.clock_start_s) +
@@ -254,6 +275,18 @@ std::vector<std::string> Film::notes() const {
     notes.push_back("the film's pictures end " + text_of("%.3g", f.missing_s) +
                     " s before its header says: it may be cut off");
   return notes;
+}
+
+std::string other_size_words(const FilmFacts& facts) {
+  const int64_t count = facts.num_other_size;
+  if (count == 0) return "";
+  const auto size = [](int width, int height) {
+    return std::to_string(width) + "x" + std::to_string(height);
+  };
+  return std::to_string(count) +
+         (count == 1 ? " picture of the film is" : " pictures of the film are") +
+         " left out: of another size (" + size(facts.other_width, facts.other_height) +
+         ") than the film's " + size(facts.width, facts.height);
 }
 
 std::string stored_words(const FilmFacts& facts) {

@@ -26,6 +26,8 @@ struct FilmFacts {
   bool is_mirrored = false;    // a player mirrors them, before it turns them
   double pixel_aspect = 1;     // the width of a pixel over its height
   int64_t num_left_out = 0;    // pictures whose time is not later than that of the one before
+  int64_t num_other_size = 0;  // pictures of another size than the header's, which are left out
+  int other_width = 0, other_height = 0;  // the size of the first of these
   int64_t num_begun_anew = 0;  // how often the clock began anew, as where two films are one file
   bool is_interlaced = false;  // by the container: the even and the odd rows may be of two moments
   bool is_joined = false;      // other films follow in the file, which are not read
@@ -55,7 +57,7 @@ class Film {
 
   // Goes to the next picture, in the order in which they are shown; false at the end. A picture
   // whose time is not later than that of the one before is left out, and counted, but where the
-  // clock began anew (sources/stream_clock.h).
+  // clock began anew (sources/stream_clock.h); so is one of another size than the header says.
   bool next();
   // Of the picture that next() went to. The index counts those that were left out, too; the time
   // is in seconds since the first picture; the picture is empty where it does not decode.
@@ -78,6 +80,9 @@ class Film {
 // How the stored pictures differ from what a player shows: "the pictures are used as they are
 // stored, upside down (a player turns them by 180 degrees clockwise)"; empty where they do not.
 std::string stored_words(const FilmFacts& facts);
+
+// Says how many pictures were left out for their size; empty where none were.
+std::string other_size_words(const FilmFacts& facts);
 
 // 8-bit grey of a picture of OpenCV with 1, 3 or 4 channels of 8 bits; else empty.
 cv::Mat luma_of(const cv::Mat& picture);

@@ -5,6 +5,7 @@
 #include "sources/film_container.h"
 
 extern "C" {
+#include <libavcodec/avcodec.h>
 #include <libavformat/avformat.h>
 #include <libavutil/display.h>
 #include <libavutil/spherical.h>
@@ -207,17 +208,87 @@ std::vector<double> picture_times(const std::string& path) {
   return times;
 }
 
-PacketCounts count_packets(const std::string& path) {
-  const Open film = open_film_file(path);
-  const AVStream* const pictures = first_pictures(*film);
-  PacketCounts counts;
-  if (pictures == nullptr) return counts;
-  read_packets(*film, *pictures, [&](const AVPacket& packet) {
-    ++counts.num;
-    counts.num_damaged += (packet.flags & AV_PKT_FLAG_CORRUPT) != 0;
-    return true;
-  });
-  return counts;
+namespace {
+
+struct Free {
+  void operator()(AVCodecContext* decoder) const { avcodec_free_context(&decoder); }
+  void operator()(AVPacket* packet) const { av_packet_free(&packet); }
+  void operator()(AVFrame* frame) const { av_frame_free(&frame); }
+};
+
+// What this decoder reports is no error of the film: it is given key frames without what follows.
+constexpr int kSilent = 1000;
+
+std::unique_ptr<AVCodecContext, Free> decoder_of(const AVStream& pictures) {
+  const AVCodec* const codec = avcodec_find_decoder(pictures.codecpar->codec_id);
+  std::unique_ptr<AVCodecContext, Free> decoder(avcodec_alloc_context3(codec));
+  if (codec == nullptr || decoder == nullptr ||
+      avcodec_parameters_to_context(decoder.get(), pictures.codecpar) < 0)
+    return nullptr;
+  decoder->log_level_offset = kSilent;
+  decoder->thread_count = 1;  // a thread each for pictures that come one at a time is of no use
+  return avcodec_open2(decoder.get(), codec, nullptr) == 0 ? std::move(decoder) : nullptr;
 }
+
+}  // namespace
+
+struct FilmPackets::State {
+  Open film;
+  const AVStream* pictures = nullptr;
+  std::unique_ptr<AVPacket, Free> packet{av_packet_alloc()};
+  std::unique_ptr<AVFrame, Free> frame{av_frame_alloc()};
+  std::unique_ptr<AVCodecContext, Free> decoder;
+  int64_t num = 0, num_damaged = 0;
+  double time_s = 0;
+  int width = 0, height = 0;
+
+  void take_packet();
+  void measure_key_frame();
+};
+
+void FilmPackets::State::take_packet() {
+  ++num;
+  num_damaged += (packet->flags & AV_PKT_FLAG_CORRUPT) != 0;
+  if (const int64_t time = time_of(*packet); time != AV_NOPTS_VALUE) {
+    const int64_t start = pictures->start_time == AV_NOPTS_VALUE ? 0 : pictures->start_time;
+    time_s = seconds(time - start, pictures->time_base);
+  }
+  if (decoder != nullptr && (packet->flags & AV_PKT_FLAG_KEY) != 0) measure_key_frame();
+}
+
+void FilmPackets::State::measure_key_frame() {
+  avcodec_flush_buffers(decoder.get());
+  if (avcodec_send_packet(decoder.get(), packet.get()) < 0) return;
+  avcodec_send_packet(decoder.get(), nullptr);  // it holds nothing back
+  if (avcodec_receive_frame(decoder.get(), frame.get()) < 0) return;
+  width = frame->width;
+  height = frame->height;
+}
+
+FilmPackets::FilmPackets(const std::string& path) : state_(std::make_unique<State>()) {
+  state_->film = open_film_file(path);
+  state_->pictures = first_pictures(*state_->film);
+  if (state_->pictures != nullptr) state_->decoder = decoder_of(*state_->pictures);
+}
+
+FilmPackets::~FilmPackets() = default;
+
+bool FilmPackets::next() {
+  State& s = *state_;
+  if (s.pictures == nullptr) return false;
+  while (av_read_frame(s.film.get(), s.packet.get()) >= 0) {
+    const bool is_own = s.packet->stream_index == s.pictures->index;
+    if (is_own) s.take_packet();
+    av_packet_unref(s.packet.get());
+    if (is_own) return true;
+  }
+  return false;
+}
+
+int64_t FilmPackets::num() const { return state_->num; }
+int64_t FilmPackets::num_damaged() const { return state_->num_damaged; }
+double FilmPackets::time_s() const { return state_->time_s; }
+int FilmPackets::width() const { return state_->width; }
+int FilmPackets::height() const { return state_->height; }
 
 }  // namespace cli

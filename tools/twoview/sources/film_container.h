@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -35,11 +36,27 @@ FilmContainer read_film_container(const std::string& path);
 // stream's start, in rising order; reads the whole file, without decoding.
 std::vector<double> picture_times(const std::string& path);
 
-// How many packets the same stream has, each of one picture as a rule, and how many of them the
-// container calls damaged; reads the whole file, without decoding.
-struct PacketCounts {
-  int64_t num = 0, num_damaged = 0;
+// The packets of the same stream, each of one picture as a rule, one by one in stored order.
+class FilmPackets {
+ public:
+  explicit FilmPackets(const std::string& path);
+  ~FilmPackets();
+  FilmPackets(const FilmPackets&) = delete;
+  FilmPackets& operator=(const FilmPackets&) = delete;
+
+  bool next();  // false at the end
+  int64_t num() const;
+  int64_t num_damaged() const;  // by the container
+  double time_s() const;        // of the last one, since the stream's start
+  // The size of the pictures from the last key frame on, by its decoder: OpenCV makes every picture
+  // the size that the header says, of memory that is not the picture's (4.6) or by a stretch. 0
+  // where there is no decoder for them.
+  int width() const;
+  int height() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
 };
-PacketCounts count_packets(const std::string& path);
 
 }  // namespace cli
