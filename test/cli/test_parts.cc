@@ -906,6 +906,32 @@ void test_a_truth_of_another_clock_or_in_degrees_is_named() {
   TEST_ASSERT_TRUE_MESSAGE(far.empty(), far.c_str());
 }
 
+void test_a_truth_whose_motion_is_not_the_paths_is_named() {
+  const auto check = [](const char* words, const std::string& doubts) {
+    TEST_ASSERT_TRUE_MESSAGE(holds(doubts, words), doubts.c_str());
+    TEST_ASSERT_EQUAL_INT(1, std::count(doubts.begin(), doubts.end(), '\n'));
+  };
+  const Trajectory path = turning_flight();
+  check("the truth stands in 10 of 60 poses, first at 2 s", doubts_of([&](size_t i, TimedPose& at) {
+          if (i > 30 && i <= 40) at.pose.t = path[30].pose.t;
+        }));
+  check("the truth stands in 30 of 60 poses, first at 0 s",
+        doubts_of([&](size_t i, TimedPose& at) { at.pose.t = path[i - i % 2].pose.t; }));
+  check("the truth jumps in 1 of 59 steps, farthest between 1.933 and 2 s: by 1.1",
+        doubts_of([](size_t i, TimedPose& at) { at.pose.t[0] += i < 30 ? 0 : 1; }));
+  check("the truth jumps in 2 of 59 steps",
+        doubts_of([](size_t i, TimedPose& at) { at.pose.t[1] += i == 30 ? 5 : 0; }));
+  check("2.4 times as long as the path's: noise",
+        doubts_of([](size_t i, TimedPose& at) { at.pose.t[i % 3] += i % 2 == 0 ? 0.2 : -0.2; }));
+  check("the truth's z is 0.5 in all poses",
+        doubts_of([](size_t, TimedPose& at) { at.pose.t[2] = 0.5; }));
+  check("a point 0.539 of its units away (right 0.2, down -0.3, ahead 0.4)",
+        doubts_of([](size_t, TimedPose& at) {
+          const Vector3 arm = applied(at.pose.R, {0.2, -0.3, 0.4});
+          for (size_t k = 0; k < 3; ++k) at.pose.t[k] += arm[k];
+        }));
+}
+
 // What is said of a truth whose times are first, first + step, ..., and how many then meet.
 std::string words_on_numbers(double first, double step, const char* pattern, int* num_met) {
   TruePoses truth;
@@ -1076,6 +1102,7 @@ int main() {
   RUN_TEST(test_times_that_are_frame_numbers_are_understood_and_said);
   RUN_TEST(test_a_true_pose_with_other_conventions_is_named);
   RUN_TEST(test_a_truth_of_another_clock_or_in_degrees_is_named);
+  RUN_TEST(test_a_truth_whose_motion_is_not_the_paths_is_named);
   RUN_TEST(test_a_truth_that_never_turns_is_named);
   RUN_TEST(test_auc_is_the_area_under_straight_lines_of_recall);
   RUN_TEST(test_percentile_lies_between_its_neighbours);

@@ -6,6 +6,7 @@
 
 #include "base/median.h"
 #include "odometry/accuracy.h"
+#include "odometry/truth_motion.h"
 
 namespace cli {
 namespace {
@@ -209,7 +210,8 @@ std::vector<std::string> truth_doubts(const Trajectory& estimate, const TruePose
   for (const std::string& words : {clock_words(estimate, truth, clock),
                                    degrees_words(estimate, truth), mirror_words(estimate, truth)})
     if (!words.empty()) doubts.push_back(words);
-  return doubts;
+  if (!doubts.empty()) return doubts;  // which explain the errors already
+  return motion_doubts(estimate, truth.poses);
 }
 
 }  // namespace cli

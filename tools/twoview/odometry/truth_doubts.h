@@ -11,7 +11,8 @@ namespace cli {
 
 // Lines on a clock that is whole frames, or a rate, off that of the frames (the turns of both then
 // fit at another time), and on positions that are latitude and longitude in degrees, or the path's
-// mirror image; empty where the truth fits as it is, and where nothing else fits clearly better.
+// mirror image, or else on its motion (odometry/truth_motion.h); empty where the truth fits as it
+// is, and where nothing else fits clearly better.
 std::vector<std::string> truth_doubts(const Trajectory& estimate, const TruePoses& truth,
                                       const FrameClock& clock);
 
