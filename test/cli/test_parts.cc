@@ -21,6 +21,7 @@
 #include "files/matches_file.h"
 #include "files/name_dates.h"
 #include "files/pairs_file.h"
+#include "odometry/combed_rows.h"
 #include "odometry/flight.h"
 #include "odometry/outputs.h"
 #include "odometry/path_order.h"
@@ -997,6 +998,34 @@ void test_pictures_of_two_eyes_are_told_from_those_of_one() {
   TEST_ASSERT_EQUAL(EyesLayout::kOne, eyes_of(EyesLayout::kSideBySide, 400));
 }
 
+// What is said of pictures of a moving wall of which `combed` of 24 are woven of two moments.
+std::string combed_words(int combed, bool is_mosaic) {
+  cv::Mat wall(240, 400, CV_8U);
+  cv::theRNG().state = 7;
+  cv::randu(wall, 0, 256);
+  cv::GaussianBlur(wall, wall, {9, 9}, 0);
+  cv::normalize(wall, wall, 0, 255, cv::NORM_MINMAX);
+  CombedRows rows;
+  for (int n = 0; n < 24; ++n) {
+    cv::Mat picture = wall(cv::Rect(n, 0, 320, 240)).clone();
+    const cv::Mat later = wall(cv::Rect(n + 6, 0, 320, 240));
+    for (int y = 1; y < 240 && n < combed; y += 2) later.row(y).copyTo(picture.row(y));
+    for (int y = 0; y < 240 && is_mosaic; ++y)
+      for (int x = 0; x < 320; ++x)
+        if (x % 2 != y % 2) picture.at<uint8_t>(y, x) /= 4;
+    rows.add(picture);
+  }
+  return rows.words();
+}
+
+void test_combed_pictures_are_named() {
+  TEST_ASSERT_TRUE(combed_words(0, false).empty());
+  TEST_ASSERT_TRUE(combed_words(6, false).empty());  // two of those that are looked at
+  TEST_ASSERT_TRUE(holds(combed_words(24, false), "in 6 of 6 pictures"));
+  TEST_ASSERT_TRUE(holds(combed_words(10, false), "are of two moments"));
+  TEST_ASSERT_TRUE(holds(combed_words(0, true), "mosaic"));
+}
+
 void check_sortable(const char* name, DateReading reading, const char* sortable) {
   static char found[80];
   const std::vector<std::string> names = sortable_names({name}, reading);
@@ -1095,6 +1124,7 @@ void test_the_path_tells_pictures_that_are_in_another_order(void) {
 int main() {
   UNITY_BEGIN();
   RUN_TEST(test_pictures_of_two_eyes_are_told_from_those_of_one);
+  RUN_TEST(test_combed_pictures_are_named);
   RUN_TEST(test_dates_and_times_of_names_are_written_so_that_they_sort);
   RUN_TEST(test_a_picture_that_stands_is_told_from_a_camera_that_does);
   RUN_TEST(test_a_clock_that_falls_and_rises_again_began_anew);

@@ -222,6 +222,7 @@ void Flight::track_frame(SourceFrame frame) {
     return;
   }
   eyes_.add(frame.luma);
+  combed_rows_.add(frame.luma);
   // Over a pause that is longer, motion is not foretold.
   if (!given_.empty() && frames_.back().withheld)
     gap_ = gap_ || frame.time_s - frames_[given_.back()].time_s > kLongestPause_s;

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "files/mask_file.h"
+#include "odometry/combed_rows.h"
 #include "odometry/flight_frame.h"
 #include "odometry/frames.h"
 #include "odometry/poses.h"
@@ -132,6 +133,7 @@ class Flight {
   std::string repeated_note() const;
   // Whether the pictures are of two eyes, so that no camera describes them.
   const TwoEyes& eyes() const { return eyes_; }
+  const CombedRows& combed_rows() const { return combed_rows_; }
   const std::string& first_problem() const { return first_problem_; }
   // Whether the source ended before its frames could be tracked to the end, or --max-frames did.
   bool ended_tracked() const;
@@ -197,6 +199,7 @@ class Flight {
   bool gap_ = false;  // a frame was left out before the next one
   RepeatedPictures repeated_;
   TwoEyes eyes_;
+  CombedRows combed_rows_;
   int num_unreadable_ = 0;
   std::string first_problem_;
 };

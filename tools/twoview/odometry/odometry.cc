@@ -639,7 +639,8 @@ int odometry(Arguments& a) {
     common.note(std::to_string(count) + (count == 1 ? " frame" : " frames") +
                 " could not be used, the first: " + flight.first_problem());
   if (const std::string note = flight.repeated_note(); !note.empty()) common.note(note);
-  if (const std::string note = flight.eyes().words(); !note.empty()) common.note(note);
+  for (const std::string& note : {flight.eyes().words(), flight.combed_rows().words()})
+    if (!note.empty()) common.note(note);
   const std::optional<FilmFacts> film = source->film();
   FlightResult result = result_of(flight, truth, film ? film->clock_start_s : 0,
                                   wanted < 0 ? static_cast<int>(flight.frames().size()) : wanted);

@@ -284,6 +284,7 @@ Json flight_json(const FlightResult& result) {
   json["num_repeated"] = flight.num_repeated();
   const std::string eyes = layout_name(flight.eyes().layout());
   json["two_eyes"] = eyes.empty() ? Json(nullptr) : Json(eyes);
+  json["combed_share"] = flight.combed_rows().share();
   json["num_keyframes"] = result.keyframes.size();
   json["num_points"] = result.points.size();
   json["num_segments"] = count_segments(result.keyframes);
