@@ -71,7 +71,8 @@ def models(tmp_path_factory):
 @pytest.mark.parametrize("form", ["text", "binary"])
 def test_a_models_poses_are_a_pairs_files_truth(models, tmp_path, form, call):
     status, out, _ = call("import", "--model", models[form], "-o", tmp_path / "out", "--json")
-    assert (status, json.loads(out)) == (0, {"images": 4, "pairs": 3})
+    assert (status, json.loads(out)) == (
+        0, {"images": 4, "pairs": 3, "contradicted_images": []})
     pairs = read_pairs(tmp_path / "out" / "pairs.txt")
     assert [(p.name0, p.name1) for p in pairs] == [
         ("a.png", "b.png"),
@@ -117,6 +118,49 @@ def test_trajectories_come_back(models, tmp_path, call):
         np.testing.assert_allclose(R, expected_R, atol=1e-12)
         np.testing.assert_allclose(centre, -expected_R.T @ t, atol=1e-12)
     assert trajectory.times_of(["images/12.5.png", "13.25.png"]) == [12.5, 13.25]
+
+
+def turned_about(line, pose):
+    """A line of images.txt with another pose, from its eight numbers; else the line."""
+    words = line.split()
+    if line.startswith("#") or len(words) != 10:
+        return line
+    number, *q_and_t = map(float, words[:8])
+    return " ".join([words[0], *map(repr, pose(q_and_t)), *words[8:]])
+
+
+def as_centre(pose):
+    R = conventions.rotation(pose[:4])
+    return pose[:4] + (-R.T @ pose[4:]).tolist()
+
+
+@pytest.mark.parametrize("pose", [
+    lambda p: p[1:4] + p[:1] + p[4:],  # x y z w
+    lambda p: [2 * v for v in p[:4]] + p[4:],
+    as_centre,
+    lambda p: p[:4] + [1000 * v for v in p[4:]]])
+def test_a_model_whose_points_contradict_its_poses_is_refused(models, tmp_path, pose, refuse):
+    for name in ("cameras.txt", "images.txt", "points3D.txt"):  # COLMAP 4 has poses in frames.txt
+        shutil.copy(models["text"] / name, tmp_path)
+    lines = (tmp_path / "images.txt").read_text().splitlines()
+    (tmp_path / "images.txt").write_text("\n".join(turned_about(l, pose) for l in lines) + "\n")
+    refuse("contradict the model's own points", "import", "--model", tmp_path, "-o", tmp_path / "o")
+
+
+def test_one_image_that_its_points_contradict_is_named(models, tmp_path, call, refuse):
+    for name in ("cameras.txt", "images.txt", "points3D.txt"):
+        shutil.copy(models["text"] / name, tmp_path)
+    lines = (tmp_path / "images.txt").read_text().splitlines()
+    at = next(i for i, line in enumerate(lines) if line.endswith(NAMES[1]))
+    lines[at] = turned_about(lines[at], lambda p: p[:4] + [p[4] + 1] + p[5:])
+    (tmp_path / "images.txt").write_text("\n".join(lines) + "\n")
+    arguments = ("import", "--model", tmp_path, "-o", tmp_path / "o")
+    status, out, _ = call(*arguments)
+    assert status == 0 and f"1 images contradict the model's own points ({NAMES[1]}: " in out
+    assert json.loads(call(*arguments, "--json")[1])["contradicted_images"] == [NAMES[1]]
+    text = (tmp_path / "cameras.txt").read_text()
+    (tmp_path / "cameras.txt").write_text(text.replace(f" {WIDTH} ", f" {WIDTH // 4} "))
+    refuse("outside its picture", *arguments)
 
 
 def test_our_tools_read_the_pairs(exported, photographs, tmp_path, call):
@@ -349,6 +393,23 @@ def test_keypoints_that_are_no_numbers_are_counted(exported, tmp_path, call):
     assert status == 0 and f"{rows} keypoints of {NAMES[0]} are NaN or infinite" in out
     report = json.loads((tmp_path / "out" / "report.json").read_text())
     assert report["invalid_keypoints"] == {NAMES[0]: rows}
+    assert f"6 pairs, 3 with a pose, {sum(p['verdict'] == 'ok' for p in report['pairs'])} of" in out
+
+
+def test_keypoints_outside_and_matches_of_other_columns_are_named(tmp_path, call, refuse):
+    path = tmp_path / "x.db"
+    write_database(path, views_of(scene_points(80)))
+    arguments = ("import", "--database", path, "-o", tmp_path / "out")
+    assert json.loads(call(*arguments, "--json")[1])["keypoints_outside"] == {}
+    with contextlib.closing(sqlite3.connect(path)) as database, database:
+        database.execute("UPDATE cameras SET width = width / 2")
+    status, out, _ = call(*arguments)
+    assert status == 0 and "is the camera of pictures of another size?" in out
+    outside = json.loads((tmp_path / "out" / "report.json").read_text())["keypoints_outside"]
+    assert sorted(outside) == list(NAMES[:2]) and 20 < outside[NAMES[0]] < 80
+    with contextlib.closing(sqlite3.connect(path)) as database, database:
+        database.execute("UPDATE matches SET rows = 2, cols = 80")
+    refuse("2 x 80 indices, not 2 in a row", *arguments)
 
 
 def test_a_fisheye_of_a_model_is_written_and_read_back(models, tmp_path, call):

@@ -186,9 +186,11 @@ def _import(arguments):
     model = read_model(a.model) if a.model else None
     if not a.database:
         count = import_model(model, a.output, a.pairs, a.sequential, a.min_common_points)
-        _say(a, {"images": len(model.images), "pairs": count},
+        _say(a, {"images": len(model.images), "pairs": count,
+                 "contradicted_images": sorted(model.contradicted)},
              f"{a.output}: {len(model.images)} images, {count} pairs; the model's focal lengths "
-             f"count as measured: a model does not say which were guessed")
+             f"count as measured: a model does not say which were guessed"
+             + model.words_on_contradicted())
         return EXIT_DONE
     report = import_database(
         a.database,
@@ -204,10 +206,16 @@ def _import(arguments):
     )
     posed = sum(row["R"] is not None and row["t"] is not None for row in report["pairs"])
     areas = ", ".join(f"{area:.1f}" for area in report["auc"].values() if area is not None)
+    ok = sum(row["verdict"] == "ok" for row in report["pairs"])
     _say(a, report, f"{a.output}/report.json: {report['num_pairs']} pairs, {posed} with a pose"
+                    f", {ok} of them ok"
                     + (f"; AUC at 5, 10, 20 degrees {areas}" if areas else "")
                     + _words_on_matches(report)
-                    + _words_on_invalid(report["invalid_keypoints"])
+                    + _words_on_invalid(report["invalid_keypoints"], "are NaN or infinite, and "
+                                        "their matches are left out")
+                    + _words_on_invalid(report["keypoints_outside"], "lie outside its picture: is "
+                                        "the camera of pictures of another size?")
+                    + (model.words_on_contradicted() if model else "")
                     + _words_on_guessed(report["guessed_focal_lengths"], a))
     return EXIT_DONE if posed else EXIT_NO_POSE
 
@@ -221,13 +229,12 @@ def _words_on_matches(report):
                            for reason, count in report["without_matches"].items())
 
 
-def _words_on_invalid(counts):
-    """Continues the summary: the images whose keypoints are no finite numbers, which belong to no
-    pose."""
+def _words_on_invalid(counts, what):
+    """Continues the summary: the images of which some keypoints are what they must not be."""
     if not counts:
         return ""
     name, count = next(iter(counts.items()))
-    return (f"; {count} keypoints of {name} are NaN or infinite, and their matches are left out"
+    return (f"; {count} keypoints of {name} {what}"
             + (f" (so it is with {len(counts) - 1} more images)" if len(counts) > 1 else ""))
 
 

@@ -274,7 +274,11 @@ def _read_pairs(database, path, what, query):
     found = []
     for pair, *row in database.execute(query):
         id0, id1 = divmod(pair, schema38.MAX_IMAGES)
-        found.append((id0, id1, _table(row, np.uint32, path, f"{what} of images {id0} and {id1}")))
+        table = _table(row, np.uint32, path, f"{what} of images {id0} and {id1}")
+        if len(table) and table.shape[1] != 2:
+            raise BadInput(f"{path}: {what} of images {id0} and {id1}: {table.shape[0]} x "
+                           f"{table.shape[1]} indices, not 2 in a row")
+        found.append((id0, id1, table))
     return found
 
 

@@ -11,7 +11,7 @@ from ..accuracy import metrics  # pose errors have the definition of the accurac
 from ..folders import foreign_words
 from . import database as db
 from .cameras import read_camera, read_sigmas
-from .conventions import camera_from_colmap, pixels_from_colmap
+from .conventions import HALF_PIXEL, camera_from_colmap, pixels_from_colmap
 from .engine import Engine
 from .errors import BadInput
 from .output import require_own, write_files
@@ -122,6 +122,7 @@ class Features:
         self.matches, self.verified = {}, {}  #: by pair of names, as two tables of the database
         self.sigmas = {}  #: CalibrationSigmas by image
         self.invalid = {}  #: by image: how many of its keypoints are not finite, where any is
+        self.outside = {}  #: by image: how many of its keypoints lie outside its picture
         with db.reading(path) as database:
             try:
                 self._read(database, given)
@@ -138,6 +139,12 @@ class Features:
             self.sigmas[name] = (self._sigmas_given[0] if given else
                                  GUESSED if camera_id in guessed else EXACT)
             self.pixels[name] = pixels_from_colmap(db.read_keypoints(database, self.path, image_id))
+            camera = self.cameras[name]
+            place = self.pixels[name] + HALF_PIXEL
+            num_outside = int(((place < 0) | (place > (camera.width, camera.height))).any(
+                axis=1).sum())
+            if num_outside:
+                self.outside[name] = num_outside
             num_invalid = int((~np.isfinite(self.pixels[name])).any(axis=1).sum())
             if num_invalid:
                 self.invalid[name] = num_invalid
@@ -320,7 +327,7 @@ def import_database(
     }
     report.update(num_pairs=len(rows), pairs=rows, options={"database": os.path.basename(path)},
                   guessed_focal_lengths=features.guessed(), without_matches=without,
-                  invalid_keypoints=features.invalid,
+                  invalid_keypoints=features.invalid, keypoints_outside=features.outside,
                   seed=estimate.seed, version=tv.version_string())
     write_files(folder, {"report.json": json.dumps(metrics.finite(report), indent=1) + "\n"})
     return report

@@ -27,6 +27,14 @@ class Model:
     images: dict  #: {name: ModelImage} of the registered images
     num_points: int = 0
     mean_error_px: float = 0.0
+    contradicted: dict = field(default_factory=dict)  #: {name: px}, see _contradicted
+
+    def words_on_contradicted(self):
+        """Continues a summary where images contradict the model's points; else empty."""
+        if not self.contradicted:
+            return ""
+        return (f"; {len(self.contradicted)} images contradict the model's own points "
+                f"({_off_words(self.contradicted)}): a wrong pose or camera?")
 
     def poses(self):
         """Returns {name: (R, centre)} of the registered images, the centre in the world frame."""
@@ -49,6 +57,36 @@ def _whole_names(path):
             at += 1  # the line of the image's points, which may be empty, follows its own
         at += 1
     return names
+
+
+# COLMAP's mapper drops what is farther from its point (Mapper.filter_max_reproj_error).
+MOST_ERROR_PX = 4
+_MOST_POINTS = 500  # of an image, that are looked at
+
+
+def _contradicted(found, names):
+    """{name: px} of the images whose pose or camera their own points contradict: more than half of
+    them lie more than MOST_ERROR_PX from their pixels, px in the median. It is so where the
+    quaternions are in another order or no unit, where poses are world_from_cam, centres or of
+    another unit than the points, and where the camera is of another size."""
+    off = {}
+    for image in found.images.values():
+        seen = image.get_observation_points2D() if image.has_pose else []
+        if not seen:
+            continue
+        seen = seen[::max(1, len(seen) // _MOST_POINTS)]
+        pose = image.cam_from_world().matrix()
+        points = np.array([found.points3D[p.point3D_id].xyz for p in seen]) @ pose[:, :3].T
+        points += pose[:, 3]
+        camera = found.cameras[image.camera_id]
+        pixels = np.array([p.xy for p in seen])
+        errors = np.linalg.norm(camera.img_from_cam(points) - pixels, axis=1)
+        is_outside = ((pixels < 0) | (pixels > (camera.width, camera.height))).any(axis=1)
+        errors[is_outside | ~(points[:, 2] > 0) | ~np.isfinite(errors)] = np.inf
+        median = float(np.median(errors))
+        if median > MOST_ERROR_PX:
+            off[names[image.image_id]] = median
+    return off
 
 
 def read_model(folder):
@@ -90,7 +128,20 @@ def read_model(folder):
                 image.camera_id, pose[:, :3].copy(), pose[:, 3].copy(), seen
             )
     error = found.compute_mean_reprojection_error() if found.num_points3D() else 0.0
-    return Model(cameras, images, found.num_points3D(), error)
+    off = _contradicted(found, names)
+    if 2 * len(off) > len(images):
+        raise BadInput(
+            f"{folder}: {len(off)} of {len(images)} images contradict the model's own points "
+            f"({_off_words(off)}): quaternions in another order than w x y z, poses or centres of "
+            f"the other direction, another unit, or a camera of pictures of another size?"
+        )
+    return Model(cameras, images, found.num_points3D(), error, off)
+
+
+def _off_words(off):
+    name, px = max(off.items(), key=lambda item: item[1])
+    return (f"{name}: half of them behind it or outside its picture" if np.isinf(px) else
+            f"{name}: {px:.3g} px off in the median")
 
 
 @dataclass
