@@ -233,6 +233,25 @@ void test_every_motion_is_estimated_near_the_bound(void) {
   expect_efficient("sideways", kind(kSideways));
 }
 
+// Few matches of a plane tell its two motions apart by chance only: a motion that is taken for the
+// only one, or gets "ok", is the true one.
+void test_a_plane_of_few_matches_leaves_both_motions(void) {
+  Kind k = kind(kGeneral);
+  k.planar = true, k.num = 70, k.noise_px = 0.7;
+  tv::Random random = tv::random_seeded(kSeed);
+  int alone = 0, ok = 0;
+  for (int i = 0; i < (kSanitized ? 20 : 600); ++i) {
+    make_scene(&random, k);
+    const tv_two_view r = estimate(scene, k, options_of(k), false, mask);
+    if (r.kind != TV_KIND_PLANAR || r.has_alternative) continue;
+    ++alone, ok += r.verdict == TV_VERDICT_OK;
+    const Vec5 e = pose_error(r.R, r.t);
+    TEST_ASSERT_TRUE_MESSAGE(e.norm() < 0.5, "the other motion of a plane, without a word");
+  }
+  std::printf("planes of 49 matches: %d with one motion, %d of them ok\n", alone, ok);
+  TEST_ASSERT_TRUE(kSanitized || ok > 10);
+}
+
 void test_planes_are_estimated_near_the_bound(void) {
   Kind k = kind(kGeneral);
   k.planar = true;
@@ -428,6 +447,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_every_motion_is_estimated_near_the_bound);
   RUN_TEST(test_planes_are_estimated_near_the_bound);
+  RUN_TEST(test_a_plane_of_few_matches_leaves_both_motions);
   RUN_TEST(test_wrong_matches_do_little_harm);
   RUN_TEST(test_a_barrel_lens_costs_no_more_than_its_own_bound);
   RUN_TEST(test_eight_and_seven_points_end_near_the_bound);

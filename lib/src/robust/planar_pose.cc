@@ -1,10 +1,27 @@
 #include "robust/planar_pose.h"
 #include "geometry/sampson.h"
 #include "geometry/transfer.h"
+#include "robust/chance.h"
 
 #include <algorithm>
 
 namespace tv {
+namespace {
+
+// Whether the matches decide against a rival of the outcome's pose, which has num_inliers: of the
+// matches that only one of the two explains, the outcome's are more than chance gives. If each were
+// as likely to be either's, the outcome's would be d more with probability at most
+// exp(-d^2 / (2 n)), n the number of both (the sign test, by Hoeffding's bound of 1963).
+bool matches_decide(const Fit& f, const Pose& rival, int num_inliers) {
+  const int rivals = near_matches(f.matches.pairs, f.matches.pairs.num, rival, f.threshold,
+                                  f.threshold, f.indices);
+  int common = 0;
+  for (int k = 0; k < rivals; ++k) common += f.out->inlier[f.indices[k]] != 0;
+  const double difference = num_inliers - rivals, apart = num_inliers + rivals - 2 * common;
+  return difference > 0 && difference * difference > -2 * kLogMeaningful * apart;
+}
+
+}  // namespace
 
 void choose_planar_pose(Fit& f, const Rivals& rivals) {
   TwoViewOutcome& out = *f.out;
@@ -41,7 +58,7 @@ void choose_planar_pose(Fit& f, const Rivals& rivals) {
         (poses[k].R - poses[best].R).squaredNorm() + (poses[k].t - poses[best].t).squaredNorm();
     // One of the other two may be the best pose again, where its refinement stopped near the same
     // flat minimum; so the most different pose is taken.
-    if (k != best && turned > farthest && 10 * inliers[k] >= 9 * inliers[best]) {
+    if (k != best && turned > farthest && !matches_decide(f, poses[k], inliers[best])) {
       other = k;
       farthest = turned;
     }
