@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "room_model/plan.h"
 #include "room_model/plan_lines.h"
 
 using cli::PlanLine;
@@ -137,6 +138,26 @@ void test_a_model_without_planes_has_no_walls() {
   TEST_ASSERT_EQUAL(0, cli::plan_lines(model).size());
 }
 
+// A leg stands in the middle of the floor; beside it, and at the edges of the floor's holes, normals
+// are wrong at one height.
+void test_what_stands_is_drawn_and_wrong_normals_are_not() {
+  RoomModel model;
+  model.voxel = kVoxel;
+  model.up = {0, 0, 1};
+  model.free_cells = cv::Mat::zeros(20, 20, CV_8U);
+  const auto add = [&model](double x, double y, double z) {
+    tv_room_vertex v = {};
+    v.position[0] = static_cast<float>(x), v.position[1] = static_cast<float>(y);
+    v.position[2] = static_cast<float>(z), v.normal[0] = 1;
+    model.vertices.push_back(v);
+  };
+  for (double z = 0.015; z < 0.4; z += kVoxel) add(2.01, 1.01, z);
+  for (double x = 0.1; x < 1.9; x += 0.01) add(x, 0.5, 0.01);
+  const cli::RoomPlan plan = cli::plan_of(cli::RoomScene{}, model);
+  TEST_ASSERT_EQUAL(1, plan.upright.size());
+  TEST_ASSERT_TRUE(plan.upright[0].contains({2.01, 1.01}));
+}
+
 }  // namespace
 
 int main() {
@@ -145,5 +166,6 @@ int main() {
   RUN_TEST(test_fronts_of_different_depth_are_lines_along_the_walls);
   RUN_TEST(test_a_wall_that_was_looked_through_has_a_gap);
   RUN_TEST(test_a_model_without_planes_has_no_walls);
+  RUN_TEST(test_what_stands_is_drawn_and_wrong_normals_are_not);
   return UNITY_END();
 }

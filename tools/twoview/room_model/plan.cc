@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <map>
 #include <opencv2/imgproc.hpp>
 #include <set>
 
@@ -13,6 +14,7 @@ namespace {
 
 constexpr int kFewestRays = 3;          // through a cell that is free: single ones may be wrong
 constexpr double kLeastPart = 0.05;     // of the largest piece of floor, for another one to count
+constexpr size_t kFewestHeights = 3;    // voxels above each other, of what stands
 constexpr double kUprightNormal = 0.3;  // the most of a normal's length along `up`: 17 degrees
 
 Vector3 position_of(const tv_room_vertex& v) {
@@ -91,15 +93,22 @@ void add_floor(const RoomModel& model, RoomPlan& plan) {
   plan.area = cv::countNonZero(kept) * model.free_cell * model.free_cell;
 }
 
-// Rows of cells that hold upright surface.
+// Rows of cells in which upright surface stands, one voxel above the other. At the edge of a hole in
+// a floor or a ceiling a vertex or two are turned by chance, at one height.
 void add_upright(const RoomModel& model, RoomPlan& plan) {
   const double cell = 1.5 * model.voxel;
-  std::set<std::pair<int, int>> cells;  // row and column: in the order of rows
+  const auto index = [](double value, double side) {
+    return static_cast<int>(std::floor(value / side));
+  };
+  std::map<std::pair<int, int>, std::set<int>> heights;  // of row and column, in voxels
   for (const tv_room_vertex& v : model.vertices) {
     if (std::abs(dot(normal_of(v), model.up)) > kUprightNormal) continue;
-    const cv::Point2d at = from_above(model.axes, position_of(v)) / cell;
-    cells.emplace(static_cast<int>(std::floor(at.y)), static_cast<int>(std::floor(at.x)));
+    const Vector3 at = applied(model.axes, position_of(v));
+    heights[{index(at[1], cell), index(at[0], cell)}].insert(index(at[2], model.voxel));
   }
+  std::set<std::pair<int, int>> cells;  // row and column: in the order of rows
+  for (const auto& [place, levels] : heights)
+    if (levels.size() >= kFewestHeights) cells.insert(place);
   for (auto first = cells.begin(); first != cells.end();) {
     auto next = std::next(first);
     int length = 1;
