@@ -138,8 +138,8 @@ void test_a_model_without_planes_has_no_walls() {
   TEST_ASSERT_EQUAL(0, cli::plan_lines(model).size());
 }
 
-// A leg stands in the middle of the floor; beside it, and at the edges of the floor's holes, normals
-// are wrong at one height.
+// A leg stands in the middle of the floor; beside it, and at the edges of the floor's holes,
+// normals are wrong at one height.
 void test_what_stands_is_drawn_and_wrong_normals_are_not() {
   RoomModel model;
   model.voxel = kVoxel;

@@ -93,8 +93,8 @@ void add_floor(const RoomModel& model, RoomPlan& plan) {
   plan.area = cv::countNonZero(kept) * model.free_cell * model.free_cell;
 }
 
-// Rows of cells in which upright surface stands, one voxel above the other. At the edge of a hole in
-// a floor or a ceiling a vertex or two are turned by chance, at one height.
+// Rows of cells in which upright surface stands, one voxel above the other. At the edge of a hole
+// in a floor or a ceiling a vertex or two are turned by chance, at one height.
 void add_upright(const RoomModel& model, RoomPlan& plan) {
   const double cell = 1.5 * model.voxel;
   const auto index = [](double value, double side) {
