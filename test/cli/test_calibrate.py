@@ -316,8 +316,9 @@ class Views(CalibrateTest):
         names = [warning["name"] for warning in result["warnings"]]
         for name in ("poor_coverage", "little_tilt", "uncertain_focal_length"):
             self.assertIn(name, names)
-        done = self.succeed(self.calibrate(*flat, out=self.folder / "words"))
+        done = self.succeed(self.calibrate(*flat, "--square", "30", out=self.folder / "words"))
         self.assertIn("little_tilt", done.stdout.decode())
+        self.assertIn("squares of 30 m: is --square in metres?", done.stdout.decode())
 
     def test_the_most_different_views_are_kept(self):
         result = self.calibrated(*self.names, "--max-views", "5")

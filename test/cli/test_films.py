@@ -86,6 +86,27 @@ class Films(CliTest):
         self.assertEqual(result["film"]["times"], "given")
         self.assertIn("--fps stands in place of the film's own times", result["notes"][0])
 
+    def test_a_raw_mpeg_2_film_has_the_rate_of_its_header(self):
+        try:
+            import cv2
+            import numpy as np
+        except ImportError as missing:
+            self.skipTest(str(missing))
+        path = self.folder / "raw.m2v"
+        film = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter_fourcc(*"mpg2"), FPS,
+                               (WIDTH, HEIGHT))
+        if not film.isOpened():
+            self.skipTest("this OpenCV writes no MPEG-2")
+        for luma in LUMA:
+            grey = np.frombuffer(luma, np.uint8).reshape(HEIGHT, WIDTH)
+            film.write(cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR))
+        film.release()
+        result = self.track(path.read_bytes(), ending=".m2v")
+        self.assertEqual((result["film"]["times"], result["film"]["rate_hz"]), ("rate", FPS))
+        self.assertEqual(result["truth"]["num_compared"], COUNT)
+        for time, true in zip(self.times(), TIMES):
+            self.assertAlmostEqual(time, true, 6)
+
     def test_every_and_max_frames_keep_the_times(self):
         self.track(mov(PICTURES, UNEVEN), "--every", 2, "--max-frames", 9, truth=truth_at(UNEVEN))
         for time, true in zip(self.times(), UNEVEN[0:18:2]):

@@ -122,6 +122,10 @@ class Mask(cli.CliTest):
         done = self.succeed(self.detect("--mask", mask))
         self.one_line(done, "note", "leaves nothing out")
 
+    def test_a_mask_of_more_than_half_a_picture_is_noted(self):
+        done = self.succeed(self.detect("--mask", self.write("most.png", half_mask(edge=80))))
+        self.one_line(done, "note", "of a.png leaves 75 % of the picture out: black is what is")
+
     def test_an_output_does_not_replace_the_mask(self):
         mask = self.write("out/keypoints.png", half_mask())
         before = mask.read_bytes()

@@ -1,5 +1,6 @@
 #include "files/mask_file.h"
 
+#include <cstdio>
 #include <filesystem>
 #include <opencv2/core.hpp>
 
@@ -72,9 +73,16 @@ double masked_share(const cv::Mat& mask) {
   return 1 - static_cast<double>(cv::countNonZero(mask)) / static_cast<double>(mask.total());
 }
 
-std::string white_mask_note(const Masks& masks, double masked_share, const std::string& pictures) {
-  if (!masks.given() || masked_share > 0) return "";
-  return "the mask of " + pictures + " leaves nothing out: it has no black pixel";
+std::string mask_note(const Masks& masks, double masked_share, const std::string& pictures) {
+  constexpr double kMuch = 0.5;
+  if (!masks.given()) return "";
+  if (masked_share == 0)
+    return "the mask of " + pictures + " leaves nothing out: it has no black pixel";
+  if (masked_share < kMuch) return "";
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", 100 * masked_share);
+  return "the mask of " + pictures + " leaves " + text +
+         " % of the picture out: black is what is left out, is it inverted?";
 }
 
 }  // namespace cli

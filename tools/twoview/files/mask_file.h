@@ -36,8 +36,8 @@ class Masks {
 // The share of a mask's pixels that are left out, [0, 1); 0 for an empty one.
 double masked_share(const cv::Mat& mask);
 
-// A note where masks are given and leave nothing out of `pictures`, by their masked_share; else
-// empty.
-std::string white_mask_note(const Masks& masks, double masked_share, const std::string& pictures);
+// A note where masks are given and leave nothing out of `pictures`, by their masked_share, or more
+// than half, as an inverted one does; else empty.
+std::string mask_note(const Masks& masks, double masked_share, const std::string& pictures);
 
 }  // namespace cli

@@ -648,9 +648,9 @@ int odometry(Arguments& a) {
       !note.empty())
     common.note(note);
   for (const std::string& note : result.truth_notes) common.note(note);
-  const std::string mask_note =
-      white_mask_note(flight.masks(), flight.masked_share(), "all frames");
-  if (!mask_note.empty()) common.note(mask_note);
+  if (const std::string note = mask_note(flight.masks(), flight.masked_share(), "all frames");
+      !note.empty())
+    common.note(note);
   if (!flight.still_mask().empty()) common.note(still_note(result));
   bool was_stopped = stop;
 #ifdef TWOVIEW_HAS_ROOM

@@ -136,6 +136,16 @@ void note_larger_board(const std::vector<BoardView>& views, Common& common) {
               board_name(seen) + "?");
 }
 
+// Notes a square that was given in millimetres or centimetres. The camera does not depend on it.
+void note_large_square(Arguments& a) {
+  constexpr double kLarge_m = 1;
+  if (!a.has_square || a.board.square < kLarge_m) return;
+  char text[120];
+  std::snprintf(text, sizeof text, "squares of %g m: is --square in metres? The views' poses are",
+                a.board.square);
+  a.common.note(text);
+}
+
 // Whether at least kTellingViews views show one other board while none shows the requested one. It
 // may be the requested board partly hidden.
 bool is_other_board_likely(const std::vector<BoardView>& views) {
@@ -399,6 +409,7 @@ int calibrate(Arguments& a) {
   files.add("coverage.png", png_bytes(coverage_picture(views, a.board, calibration)));
   files.add("residuals.png", png_bytes(residuals_picture(views, calibration)));
   if (a.common.json) print(json_text(json));
+  note_large_square(a);
   const std::string notes = a.common.note_lines();
   if (a.common.speaks()) print(summary(views, calibration, warnings, notes, files));
   files.commit();

@@ -41,7 +41,7 @@ std::string Common::note_lines() const {
 void add_picture_mask(const std::string& name, Picture& picture, Common& common) {
   const Masks& masks = common.options.masks;
   picture.mask = masks.of(name, picture.luma.cols, picture.luma.rows);
-  const std::string note = white_mask_note(masks, masked_share(picture.mask), name);
+  const std::string note = mask_note(masks, masked_share(picture.mask), name);
   if (!note.empty()) common.note(note);
 }
 
