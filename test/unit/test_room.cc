@@ -406,6 +406,88 @@ void test_what_was_pruned_comes_back_where_another_map_confirms_it() {
   }
 }
 
+// The voxels' sums, block by block in the order of their places.
+std::map<uint64_t, std::vector<uint64_t>> sums_of(const tv_room* room) {
+  std::map<uint64_t, std::vector<uint64_t>> sums;
+  for (int32_t k = 0; k < room->end_blocks; ++k) {
+    if (room->blocks[k].key == 0) continue;
+    const tv::Voxel* voxels = tv::voxels_of(*room, k);
+    std::vector<uint64_t>& all = sums[room->blocks[k].key];
+    for (int32_t v = 0; v < tv::kBlockVoxels; ++v) {
+      all.push_back(voxels[v].evidence);
+      all.push_back(voxels[v].colour);
+    }
+  }
+  return sums;
+}
+
+// How far in front of what a map shows at its nearest pixel a point lies; below 0 outside the map.
+double in_front(const Map& m, const double point[3]) {
+  double p[3] = {0, 0, 0}, square = 0;
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) p[i] += m.R[3 * k + i] * (point[k] - m.t[k]);
+    square += p[i] * p[i];
+  }
+  const double x = std::floor(m.camera.fx * p[0] / p[2] + m.camera.cx + 0.5);
+  const double y = std::floor(m.camera.fy * p[1] / p[2] + m.camera.cy + 0.5);
+  if (!(p[2] > 0 && x >= 0 && y >= 0 && x < m.camera.width && y < m.camera.height)) return -1;
+  return static_cast<double>(m.distance[static_cast<size_t>(y * m.camera.width + x)]) -
+         std::sqrt(square);
+}
+
+void test_voxels_are_seen_through_by_the_maps_that_see_farther() {
+  std::vector<Map> maps = tour(hall(), box_room::pinhole(160, 120, 110), 5, 0.02f);
+  // One is noise, which makes blocks anywhere before the surfaces of the others.
+  tv::Random random = tv::random_seeded(7);
+  for (float& d : maps[2].distance)
+    d *= 0.1f + 0.001f * static_cast<float>(tv::random_below(random, 900));
+  tv_room* room = new_room(0.06);
+  for (const Map& m : maps) TEST_ASSERT_EQUAL(TV_OK, add(room, m));
+  for (const Map& m : maps) TEST_ASSERT_EQUAL(TV_OK, see_through(room, m));
+  int num_free = 0, num_wrong = 0;
+  for (int32_t k = 0; k < room->end_blocks; ++k) {
+    if (room->blocks[k].key == 0) continue;
+    const tv::BlockPlace at = tv::place_of(room->blocks[k].key);
+    const double corner[3] = {at.x * 0.24, at.y * 0.24, at.z * 0.24};
+    const double centre[3] = {corner[0] + 0.12, corner[1] + 0.12, corner[2] + 0.12};
+    for (int32_t v = 0; v < tv::kBlockVoxels; ++v) {
+      const double voxel[3] = {corner[0] + 0.06 * (v % 4 + 0.5),
+                               corner[1] + 0.06 * (v / 4 % 4 + 0.5),
+                               corner[2] + 0.06 * (v / 16 + 0.5)};
+      int at_least = 0, at_most = 0;
+      for (const Map& m : maps) {
+        const bool is_free = in_front(m, voxel) > 3 * 0.06;
+        at_most += is_free;
+        at_least += is_free && in_front(m, centre) > -1;
+      }
+      const int32_t num = tv::free_count(tv::voxels_of(*room, k)[v].evidence);
+      num_free += num;
+      num_wrong += num < at_least || num > at_most;
+    }
+  }
+  TEST_ASSERT_TRUE(num_free > 10000);
+  TEST_ASSERT_EQUAL(0, num_wrong);
+}
+
+// Fusion compares blocks with squares of a map whose size follows from the room's memory.
+void test_the_voxels_are_the_same_in_little_memory_as_in_much() {
+  std::vector<Map> maps = tour(hall(), box_room::pinhole(640, 480, 440), 4, 0.02f);
+  for (size_t k = 0; k < maps[1].distance.size(); k += 7) maps[1].distance[k] = 0;
+  std::map<uint64_t, std::vector<uint64_t>> sums[2][3];
+  for (const bool little : {false, true}) {
+    tv_room* room = new_room(0.3, little ? TV_ROOM_MIN_BYTES : sizeof memory);
+    for (const Map& m : maps) TEST_ASSERT_EQUAL(TV_OK, add(room, m));
+    sums[little][0] = sums_of(room);
+    for (const Map& m : maps) TEST_ASSERT_EQUAL(TV_OK, see_through(room, m));
+    sums[little][1] = sums_of(room);
+    TEST_ASSERT_EQUAL(TV_OK, remove(room, maps[2]));
+    sums[little][2] = sums_of(room);
+  }
+  TEST_ASSERT_TRUE(sums[0][0].size() > 50);
+  TEST_ASSERT_TRUE(sums[0][1] != sums[0][0]);
+  for (int k = 0; k < 3; ++k) TEST_ASSERT_TRUE(sums[0][k] == sums[1][k]);
+}
+
 void test_distances_that_are_none_are_unknown() {
   const float odd[] = {0.0f, -1.0f, NAN, INFINITY, -INFINITY, 1e-38f, 3e38f};
   tv_room* room = new_room();
@@ -854,6 +936,8 @@ int main(void) {
   RUN_TEST(test_a_map_sees_through_later_blocks_when_told_and_is_removed_exactly_then);
   RUN_TEST(test_a_room_that_is_full_keeps_what_it_has_and_goes_on_coarser);
   RUN_TEST(test_what_was_pruned_comes_back_where_another_map_confirms_it);
+  RUN_TEST(test_voxels_are_seen_through_by_the_maps_that_see_farther);
+  RUN_TEST(test_the_voxels_are_the_same_in_little_memory_as_in_much);
   RUN_TEST(test_distances_that_are_none_are_unknown);
   RUN_TEST(test_small_pieces_are_left_out);
   RUN_TEST(test_plain_walls_are_found_by_their_edges_and_inferred_between);

@@ -101,7 +101,7 @@ struct tv_room {
   int32_t bucket_shift;  // 64 less the bits of a bucket's index
   tv::MapRecord* records;
   tv::Block* blocks;
-  tv::Surfel* surfels;  // scratch of the planes, one of each block
+  tv::Surfel* surfels;  // one of each block: scratch of the planes, and of fusion (readings.h)
   tv::Voxel* voxels;    // kBlockVoxels of each block
   int32_t* near;
   int32_t* buckets;  // the first block of each, or -1

@@ -1,103 +1,112 @@
 #include "room/fuse.h"
 
 #include <cmath>
-#include <cstring>
+
+#include "geometry/vector3.h"
 
 namespace tv {
-
-bool shows_scene(const tv_depth_map& map, int32_t x, int32_t y) {
-  return map.mask == nullptr || map.mask[y * map.mask_stride_bytes + x] != 0;
-}
-
 namespace {
 
-// Without sigmas, a hundredth of the distance.
-constexpr double kRelativeSigma = 0.01;
-// The weight of a pixel whose sigma is a voxel. With the largest weight of 64 the smallest sigma
-// that counts is half a voxel: the voxels' own resolution.
-constexpr double kUnitWeight = 16;
 // Where the nearest pixel is unknown, a neighbour stands in for it with this part of its weight: it
 // fills holes, and yet moves an outline, where others see it, by little.
 constexpr int32_t kBorrowed = 4;
 // Inferred distances have no errors that average out: they are fused at most so many voxels before
 // and behind their surface. That is a voxel across it where it is seen at an angle of 20 degrees.
 constexpr int32_t kInferredVoxels = 3;
+// Comparisons with what a tile measured at most or at least leave this part of a distance for what
+// numbers are rounded by.
+constexpr double kRounding = 1e-6;
 
 struct Fusion {
   const tv_room& room;
   const RoomView& view;
-  double voxel, truncation, max_distance;
+  Readings readings;
+  double voxel, truncation;
   int32_t reach_voxels;  // the map is fused so far before and behind its surface
+  double reach;
+  Tiles tiles;
+  Tile whole;  // all of them in one
 };
 
 Fusion fusion_of(const tv_room& room, const RoomView& view) {
   const tv_room_options& o = room.options;
   const bool is_near = view.map.inferred != 0 && o.truncation_voxels > kInferredVoxels;
-  return {room,
-          view,
-          o.voxel,
-          o.voxel * o.truncation_voxels,
-          o.max_distance > 0 ? o.max_distance : 1e30,
-          is_near ? kInferredVoxels : o.truncation_voxels};
+  const int32_t reach_voxels = is_near ? kInferredVoxels : o.truncation_voxels;
+  Fusion f = {room,
+              view,
+              readings_of(room, view),
+              o.voxel,
+              o.voxel * o.truncation_voxels,
+              reach_voxels,
+              o.voxel * reach_voxels,
+              {},
+              {}};
+  f.tiles =
+      make_tiles(&f.readings, room.surfels, static_cast<size_t>(room.cap_blocks) * sizeof(Surfel));
+  f.whole = joined(f.tiles);
+  return f;
 }
 
-Measured measured_at(const Fusion& f, int32_t x, int32_t y) {
-  const tv_depth_map& map = f.view.map;
-  const ptrdiff_t at = static_cast<ptrdiff_t>(y) * map.stride + x;
-  const Measured unknown = {0, 0, 0};
-  if (map.witnesses != nullptr && map.witnesses[at] == 0) return unknown;
-  if (!shows_scene(map, x, y)) return unknown;
-  const double distance = static_cast<double>(map.distance[at]);
-  if (!(distance > 0 && distance <= f.max_distance)) return unknown;
-  const double sigma =
-      map.sigma != nullptr ? static_cast<double>(map.sigma[at]) : kRelativeSigma * distance;
-  if (!(sigma > 0)) return unknown;
-  const double ratio = f.voxel / sigma;
-  const double weight = kUnitWeight * (ratio * ratio) + 0.5;
-  return {distance, sigma, weight < kMaxWeight ? static_cast<int32_t>(weight) : kMaxWeight};
-}
+// A pixel.
+struct Place {
+  int32_t x, y;
+};
 
-// The known pixel that is nearest to (u, v), of the four around it. Its weight is 0 where none is
-// known.
-Measured nearest_known(const Fusion& f, double u, double v, int32_t* x, int32_t* y) {
-  const int32_t x0 = floor_of(u), y0 = floor_of(v);
-  const bool right = u - x0 >= 0.5, low = v - y0 >= 0.5;
-  const double a = right ? x0 + 1 - u : u - x0, b = low ? y0 + 1 - v : v - y0;
-  Measured m = {0, 0, 0};
-  for (int k = 0; k < 4 && m.weight == 0; ++k) {
-    // The nearest first, the opposite last, between them the one across the smaller gap.
-    const bool across = k == 3 || k == (a > b ? 1 : 2);
-    const bool down = k == 3 || k == (a > b ? 2 : 1);
-    *x = x0 + (right != across), *y = y0 + (low != down);
-    const tv_depth_map& map = f.view.map;
-    if (*x >= 0 && *y >= 0 && *x < map.width && *y < map.height) m = measured_at(f, *x, *y);
-    if (k > 0 && m.weight > 0) m.weight = (m.weight + kBorrowed - 1) / kBorrowed;
-  }
-  return m;
-}
+// The four pixels around (u, v): left and right above, left and right below.
+struct Corners {
+  int32_t x, y;   // of the first
+  double a, b;    // where (u, v) lies between them
+  int32_t known;  // bit k: something was measured at the k-th
+};
 
-// The distance at a pixel (u, v), nearest to (x, y): interpolated, where the four pixels around it
-// are known and lie on one surface.
-double distance_near(const Fusion& f, double u, double v, const Measured& nearest) {
-  const tv_depth_map& map = f.view.map;
+Corners corners_of(const Fusion& f, double u, double v) {
   const int32_t x = floor_of(u), y = floor_of(v);
-  if (x < 0 || y < 0 || x + 1 >= map.width || y + 1 >= map.height) return nearest.distance;
-  const double a = u - x, b = v - y;
+  const tv_depth_map& map = f.view.map;
+  int32_t known = 0;
+  for (int32_t k = 0; k < 4; ++k) {
+    const int32_t px = x + (k & 1), py = y + (k >> 1);
+    const bool inside = px >= 0 && py >= 0 && px < map.width && py < map.height;
+    known |= (inside && is_known(f.readings, px, py) ? 1 : 0) << k;
+  }
+  return {x, y, u - x, v - y, known};
+}
+
+// The known one that is nearest, of which there is one. is_borrowed: it is not the nearest of all.
+Place nearest_known(const Corners& c, bool* is_borrowed) {
+  const bool right = c.a >= 0.5, low = c.b >= 0.5;
+  const int32_t nearest = (right ? 1 : 0) + (low ? 2 : 0);
+  int32_t k = nearest;
+  *is_borrowed = (c.known >> nearest & 1) == 0;
+  if (*is_borrowed) {
+    // The one across the smaller gap, then that across the other, then the opposite one.
+    const double gap_x = right ? 1 - c.a : c.a, gap_y = low ? 1 - c.b : c.b;
+    const int32_t first = gap_x > gap_y ? 1 : 2;
+    k = (c.known >> (nearest ^ first) & 1) != 0         ? nearest ^ first
+        : (c.known >> (nearest ^ (3 - first)) & 1) != 0 ? nearest ^ (3 - first)
+                                                        : nearest ^ 3;
+  }
+  return {c.x + (k & 1), c.y + (k >> 1)};
+}
+
+// The distance between the corners, near one of that distance: interpolated, where all are known
+// and lie on one surface.
+double distance_near(const Fusion& f, const Corners& c, double nearest) {
+  if (c.known != 15) return nearest;
   double sum = 0;
   for (int k = 0; k < 4; ++k) {
-    const Measured m = measured_at(f, x + (k & 1), y + (k >> 1));
-    const double step = m.distance - nearest.distance;
-    if (m.weight == 0 || step > f.truncation || -step > f.truncation) return nearest.distance;
-    sum += m.distance * ((k & 1) != 0 ? a : 1 - a) * ((k >> 1) != 0 ? b : 1 - b);
+    const double distance = distance_at(f.readings, c.x + (k & 1), c.y + (k >> 1));
+    const double step = distance - nearest;
+    if (step > f.truncation || -step > f.truncation) return nearest;
+    sum += distance * ((k & 1) != 0 ? c.a : 1 - c.a) * ((k >> 1) != 0 ? c.b : 1 - c.b);
   }
   return sum;
 }
 
 // Red, green and blue, at a pixel, packed as a voxel's sums.
-uint64_t colour_at(const tv_depth_map& map, int32_t x, int32_t y) {
+uint64_t colour_at(const tv_depth_map& map, const Place& at) {
   int64_t rgb[3] = {128, 128, 128};
   if (map.pixels != nullptr) {
-    const uint8_t* p = map.pixels + y * map.pixel_stride_bytes + map.channels * x;
+    const uint8_t* p = map.pixels + at.y * map.pixel_stride_bytes + map.channels * at.x;
     for (int k = 0; k < 3; ++k) rgb[k] = p[map.channels == 3 ? k : 0];
   }
   return pack_colour(rgb);
@@ -105,13 +114,14 @@ uint64_t colour_at(const tv_depth_map& map, int32_t x, int32_t y) {
 
 // The pixel of a point; false where it lies outside the map.
 bool pixel_of(const RoomView& view, const Vec3& point, double* u, double* v) {
-  Vec2 pixel;
-  if (view.camera.model.model == TV_CAMERA_PINHOLE) {
+  const tv_camera& lens = view.camera.model;
+  if (lens.model == TV_CAMERA_PINHOLE) {
     if (!(point[2] > 0)) return false;
     const double inverse = 1 / point[2];
-    *u = view.camera.model.fx * (point[0] * inverse) + view.camera.model.cx;
-    *v = view.camera.model.fy * (point[1] * inverse) + view.camera.model.cy;
+    *u = lens.fx * (point[0] * inverse) + lens.cx;
+    *v = lens.fy * (point[1] * inverse) + lens.cy;
   } else {
+    Vec2 pixel;
     if (!project(view.camera, point, &pixel, nullptr)) return false;
     *u = pixel[0];
     *v = pixel[1];
@@ -119,204 +129,246 @@ bool pixel_of(const RoomView& view, const Vec3& point, double* u, double* v) {
   return *u >= -0.5 && *v >= -0.5 && *u < view.map.width - 0.5 && *v < view.map.height - 0.5;
 }
 
-// What the view contributes to a voxel at a point of its camera's frame; false where that is
-// nothing. near: the voxel may be near the surface; else only seeing through it counts.
-bool contribution(const Fusion& f, const Vec3& point, bool near, Voxel* added) {
-  double u, v;
-  if (!pixel_of(f.view, point, &u, &v)) return false;
-  int32_t x = 0, y = 0;
-  const Measured m = nearest_known(f, u, v, &x, &y);
-  if (m.weight == 0) return false;
-  const double range = std::sqrt((point[0] * point[0] + point[1] * point[1]) + point[2] * point[2]);
-  const double in_front = m.distance - range;
-  if (in_front > f.truncation) {
-    *added = {kSeenThrough, 0};
-    return f.view.map.inferred == 0 && in_front > 3 * m.sigma;
-  }
-  if (!near) return false;
-  const double distance = distance_near(f, u, v, m) - range;
-  const double reach = f.voxel * f.reach_voxels;
-  if (!(distance <= reach && distance >= -reach)) return false;
-  const double share = distance / f.truncation;
-  const int32_t steps = floor_of(share * kMaxDistance + 0.5);
-  // The weight falls from a third of the truncation behind the surface on: what lies there may be
-  // the other side of a thin wall.
-  const double fade = share < -1.0 / 3 ? 1.5 * (1 + share) : 1;
-  const int32_t faded = static_cast<int32_t>(fade * m.weight + 0.5);
-  const int32_t weight = faded > 0 ? faded : 1;
-  *added = {pack_evidence(int64_t{steps} * weight, weight, 1, 0), colour_at(f.view.map, x, y)};
-  return true;
-}
+// How the view sees the voxels of a block: at which pixels, and how far away. What lies outside the
+// map has kOutside for u.
+constexpr double kOutside = -1;
+struct Sights {
+  double u[kBlockVoxels], v[kBlockVoxels], range[kBlockVoxels];
+};
 
-// Adds the view to a block, or subtracts it. near: the block is one of those around its surface.
-void fuse_block(const Fusion& f, int32_t index, bool near, bool subtract) {
+// The centres of a block's voxels, in the camera's frame.
+void place_voxels(const Fusion& f, int32_t index, double points[3][kBlockVoxels]) {
   const BlockPlace place = place_of(f.room.blocks[index].key);
   const Mat3& R = f.view.rotation;
   const double side = f.voxel * kBlockSide, half = 0.5 * f.voxel;  // a voxel is its centre
   const double from[3] = {place.x * side + half - f.view.centre[0],
                           place.y * side + half - f.view.centre[1],
                           place.z * side + half - f.view.centre[2]};
-  Vec3 corner, axis[3];
   for (int i = 0; i < 3; ++i) {
-    corner[i] = (R(0, i) * from[0] + R(1, i) * from[1]) + R(2, i) * from[2];
-    for (int k = 0; k < 3; ++k) axis[k][i] = R(k, i) * f.voxel;
-  }
-  Voxel* voxel = voxels_of(f.room, index);
-  for (int z = 0; z < kBlockSide; ++z) {
-    for (int y = 0; y < kBlockSide; ++y) {
-      for (int x = 0; x < kBlockSide; ++x, ++voxel) {
-        Vec3 point;
-        for (int i = 0; i < 3; ++i) {
-          point[i] = corner[i] + ((x * axis[0][i] + y * axis[1][i]) + z * axis[2][i]);
+    const double corner = (R(0, i) * from[0] + R(1, i) * from[1]) + R(2, i) * from[2];
+    const double axis[3] = {R(0, i) * f.voxel, R(1, i) * f.voxel, R(2, i) * f.voxel};
+    double* point = points[i];
+    for (int z = 0; z < kBlockSide; ++z) {
+      for (int y = 0; y < kBlockSide; ++y) {
+        for (int x = 0; x < kBlockSide; ++x) {
+          *point++ = corner + ((x * axis[0] + y * axis[1]) + z * axis[2]);
         }
-        Voxel added;
-        if (!contribution(f, point, near, &added)) continue;
-        voxel->evidence += subtract ? ~added.evidence + 1 : added.evidence;
-        voxel->colour += subtract ? ~added.colour + 1 : added.colour;
       }
     }
   }
 }
 
-// Whether the view may see something of a block through which it could see.
-bool may_see(const Fusion& f, int32_t index) {
+void see_voxels(const Fusion& f, int32_t index, Sights* s) {
+  double p[3][kBlockVoxels];
+  place_voxels(f, index, p);
+  for (int n = 0; n < kBlockVoxels; ++n) {
+    s->range[n] = std::sqrt((p[0][n] * p[0][n] + p[1][n] * p[1][n]) + p[2][n] * p[2][n]);
+  }
+  const RoomView& view = f.view;
+  const tv_camera& lens = view.camera.model;
+  if (lens.model == TV_CAMERA_PINHOLE) {
+    for (int n = 0; n < kBlockVoxels; ++n) {
+      const double inverse = 1 / p[2][n];
+      s->u[n] = lens.fx * (p[0][n] * inverse) + lens.cx;
+      s->v[n] = lens.fy * (p[1][n] * inverse) + lens.cy;
+    }
+    const double right = view.map.width - 0.5, bottom = view.map.height - 0.5;
+    for (int n = 0; n < kBlockVoxels; ++n) {
+      const bool inside =
+          p[2][n] > 0 && s->u[n] >= -0.5 && s->v[n] >= -0.5 && s->u[n] < right && s->v[n] < bottom;
+      s->u[n] = inside ? s->u[n] : kOutside;
+    }
+  } else {
+    for (int n = 0; n < kBlockVoxels; ++n) {
+      if (!pixel_of(view, Vec3(p[0][n], p[1][n], p[2][n]), &s->u[n], &s->v[n])) s->u[n] = kOutside;
+    }
+  }
+}
+
+// What the view contributes to a voxel that it sees at (u, v) and so far away; false where that is
+// nothing. near: the voxel may be near the surface; else only seeing through it counts.
+bool contribution(const Fusion& f, double u, double v, double range, bool near, Voxel* added) {
+  const Corners corners = corners_of(f, u, v);
+  if (corners.known == 0) return false;
+  bool is_borrowed;
+  const Place at = nearest_known(corners, &is_borrowed);
+  const double nearest = distance_at(f.readings, at.x, at.y);
+  const double in_front = nearest - range;
+  if (in_front > f.truncation) {
+    *added = {kSeenThrough, 0};
+    return f.view.map.inferred == 0 && in_front > 3 * sigma_at(f.readings, at.x, at.y);
+  }
+  if (!near) return false;
+  const double distance = distance_near(f, corners, nearest) - range;
+  if (!(distance <= f.reach && distance >= -f.reach)) return false;
+  const int32_t full = weight_of(f.voxel, sigma_at(f.readings, at.x, at.y));
+  const int32_t known = is_borrowed ? (full + kBorrowed - 1) / kBorrowed : full;
+  const double share = distance / f.truncation;
+  const int32_t steps = floor_of(share * kMaxDistance + 0.5);
+  // The weight falls from a third of the truncation behind the surface on: what lies there may be
+  // the other side of a thin wall.
+  const double fade = share < -1.0 / 3 ? 1.5 * (1 + share) : 1;
+  const int32_t faded = static_cast<int32_t>(fade * known + 0.5);
+  const int32_t weight = faded > 0 ? faded : 1;
+  *added = {pack_evidence(int64_t{steps} * weight, weight, 1, 0), colour_at(f.view.map, at)};
+  return true;
+}
+
+// Adds the view to a block, or subtracts it. near: the block is one of those around its surface.
+void fuse_block(const Fusion& f, int32_t index, bool near, bool subtract) {
+  Sights s;
+  see_voxels(f, index, &s);
+  Voxel* const voxels = voxels_of(f.room, index);
+  for (int n = 0; n < kBlockVoxels; ++n) {
+    Voxel added;
+    if (s.u[n] == kOutside) continue;
+    if (!contribution(f, s.u[n], s.v[n], s.range[n], near, &added)) continue;
+    voxels[n].evidence += subtract ? ~added.evidence + 1 : added.evidence;
+    voxels[n].colour += subtract ? ~added.colour + 1 : added.colour;
+  }
+}
+
+// A ball around a block, in the camera's frame.
+struct Ball {
+  Vec3 centre;
+  double radius, range;  // range: of its centre
+};
+
+Ball ball_of(const Fusion& f, int32_t index) {
   const BlockPlace place = place_of(f.room.blocks[index].key);
   const double side = f.voxel * kBlockSide, half = 0.5 * side;
   const double from[3] = {place.x * side + half - f.view.centre[0],
                           place.y * side + half - f.view.centre[1],
                           place.z * side + half - f.view.centre[2]};
   const Mat3& R = f.view.rotation;
-  Vec3 point;
+  double centre[3];
   for (int i = 0; i < 3; ++i)
-    point[i] = (R(0, i) * from[0] + R(1, i) * from[1]) + R(2, i) * from[2];
+    centre[i] = (R(0, i) * from[0] + R(1, i) * from[1]) + R(2, i) * from[2];
+  return {Vec3(centre[0], centre[1], centre[2]), 0.8661 * side, length_of(centre)};
+}
+
+// The tiles whose pixels, or neighbours of these, may show something of the ball.
+TileRange tiles_around(const Fusion& f, const Ball& ball) {
+  const TileRange all = {0, 0, f.tiles.columns - 1, f.tiles.rows - 1}, none = {0, 0, -1, -1};
+  const tv_depth_map& map = f.view.map;
+  const tv_camera& lens = f.view.camera.model;
+  const double x = ball.centre[0], y = ball.centre[1], z = ball.centre[2];
+  if (lens.model != TV_CAMERA_PINHOLE) return all;
+  if (z < -ball.radius) return none;
+  if (z < 2 * ball.radius) return all;
+  // |x / z - x0 / z0| of a point in the ball is at most radius (z0 + |x0|) / (z0 (z0 - radius)).
+  const double inverse = 1 / z, scale = ball.radius * inverse / (z - ball.radius);
+  const double u = lens.fx * (x * inverse) + lens.cx, v = lens.fy * (y * inverse) + lens.cy;
+  const double across = lens.fx * scale * (z + std::fabs(x)) + 1;
+  const double down = lens.fy * scale * (z + std::fabs(y)) + 1;
+  if (!(u + across > 0 && v + down > 0 && u - across < map.width && v - down < map.height)) {
+    return none;
+  }
+  const auto tile_at = [&f](double pixel, int32_t end) {
+    const double inside = pixel < 0 ? 0 : pixel > end - 1 ? end - 1 : pixel;
+    return static_cast<int32_t>(inside) >> f.tiles.shift;
+  };
+  return {tile_at(u - across, map.width), tile_at(v - down, map.height),
+          tile_at(u + across, map.width), tile_at(v + down, map.height)};
+}
+
+// Whether the view may see through something of a block, of which it sees the centre.
+bool may_see_through(const Fusion& f, int32_t index) {
+  const Ball ball = ball_of(f, index);
   double u, v;
-  return pixel_of(f.view, point, &u, &v);
+  if (!pixel_of(f.view, ball.centre, &u, &v)) return false;
+  const double least = (ball.range - ball.radius + f.truncation) * (1 - kRounding);
+  if (static_cast<double>(f.whole.most) < least) return false;
+  const TileRange range = tiles_around(f, ball);
+  for (int32_t y = range.top; y <= range.bottom; ++y) {
+    for (int32_t x = range.left; x <= range.right; ++x) {
+      if (static_cast<double>(f.tiles.tile[y * f.tiles.columns + x].most) >= least) return true;
+    }
+  }
+  return false;
+}
+
+// Whether a block may be near the view's surface.
+bool may_be_near(const Fusion& f, int32_t index) {
+  const Ball ball = ball_of(f, index);
+  const double within = ball.radius + f.reach + kRounding * (ball.range + f.reach);
+  if (ball.range + within < static_cast<double>(f.whole.least)) return false;
+  if (ball.range - within > static_cast<double>(f.whole.most)) return false;
+  const TileRange range = tiles_around(f, ball);
+  return range.left <= range.right;
+}
+
+// The first known pixel of a square of pixels.
+Place first_known(const Fusion& f, const Place& corner, int32_t side) {
+  const tv_depth_map& map = f.view.map;
+  for (int32_t k = 0; k < side * side; ++k) {
+    const Place at = {corner.x + k % side, corner.y + k / side};
+    if (at.x < map.width && at.y < map.height && is_known(f.readings, at.x, at.y)) return at;
+  }
+  return {-1, -1};
+}
+
+// The block of a measured point that is moved along its ray; false beyond all blocks.
+bool block_at(const Fusion& f, const double direction[3], double range, int32_t place[3]) {
+  const double block = f.voxel * kBlockSide;
+  bool inside = range > 0;
+  for (int i = 0; i < 3; ++i) {
+    const double c = (f.view.centre[i] + range * direction[i]) / block;
+    inside = inside && c >= -kBlockReach + 1 && c < kBlockReach - 1;
+    place[i] = inside ? floor_of(c) : 0;
+  }
+  return inside;
+}
+
+// The side of the squares of pixels of which one is enough: at most half a block where the surface
+// is farthest.
+int32_t square_side(const Fusion& f) {
+  const double farthest = f.whole.most > 0 ? static_cast<double>(f.whole.most) : 0;
+  const tv_camera& lens = f.view.camera.model;
+  const double pixel = farthest / (lens.fx < lens.fy ? lens.fx : lens.fy);
+  const double block = f.voxel * kBlockSide;
+  return 8 * pixel < block ? 4 : 4 * pixel < block ? 2 : 1;
 }
 
 // Calls visit(key) for the blocks within the view's reach of each measured point: of one pixel in
-// each square of `step` pixels. Stops where it returns false, and returns false then.
+// each square of pixels. Stops where it returns false, and returns false then.
 template <typename Visit>
 bool visit_near(const Fusion& f, const Visit& visit) {
   const tv_depth_map& map = f.view.map;
-  const double block = f.voxel * kBlockSide;
-  double farthest = 0;
-  for (int32_t y = 0; y < map.height; ++y) {
-    for (int32_t x = 0; x < map.width; ++x) {
-      const Measured m = measured_at(f, x, y);
-      if (m.weight > 0 && m.distance > farthest) farthest = m.distance;
-    }
-  }
-  // Squares that are at most half a block large where the surface is farthest.
-  const tv_camera& lens = f.view.camera.model;
-  const double pixel = farthest / (lens.fx < lens.fy ? lens.fx : lens.fy);
-  const int32_t step = 8 * pixel < block ? 4 : 4 * pixel < block ? 2 : 1;
-  uint64_t last = 0;
-  for (int32_t y = 0; y < map.height; y += step) {
-    for (int32_t x = 0; x < map.width; x += step) {
-      int32_t k = 0;
-      Measured m = {0, 0, 0};
-      for (; k < step * step; ++k) {
-        const int32_t px = x + k % step, py = y + k / step;
-        if (px < map.width && py < map.height) m = measured_at(f, px, py);
-        if (m.weight > 0) break;
-      }
+  const int32_t side = square_side(f);
+  // Most points lie in blocks of others nearby.
+  constexpr int kVisitedBits = 8;
+  uint64_t visited[1 << kVisitedBits] = {};
+  for (int32_t y = 0; y < map.height; y += side) {
+    for (int32_t x = 0; x < map.width; x += side) {
+      const Place at = first_known(f, {x, y}, side);
       Vec3 ray;
-      if (m.weight == 0 ||
-          !unproject(f.view.camera, Vec2(x + k % step, y + k / step), &ray, nullptr)) {
-        continue;
-      }
+      if (at.x < 0 || !unproject(f.view.camera, Vec2(at.x, at.y), &ray, nullptr)) continue;
       const double d[3] = {ray[0], ray[1], ray[2]};
       double direction[3];
-      for (int i = 0; i < 3; ++i) {
-        const Mat3& R = f.view.rotation;
-        direction[i] = ((R(i, 0) * d[0] + R(i, 1) * d[1]) + R(i, 2) * d[2]);
-      }
+      rotate(f.view.rotation, d, direction);
+      const double distance = distance_at(f.readings, at.x, at.y);
       for (int32_t s = -f.reach_voxels; s <= f.reach_voxels; s += 2) {
-        const double range = m.distance + s * f.voxel;
         int32_t place[3];
-        bool inside = range > 0;
-        for (int i = 0; i < 3; ++i) {
-          const double c = (f.view.centre[i] + range * direction[i]) / block;
-          inside = inside && c >= -kBlockReach + 1 && c < kBlockReach - 1;
-          place[i] = inside ? floor_of(c) : 0;
-        }
-        if (!inside) continue;
+        if (!block_at(f, direction, distance + s * f.voxel, place)) continue;
         const uint64_t key =
             block_key(f.room, {place[0], place[1], place[2], f.view.map.inferred != 0});
-        if (key != last && !visit(key)) return false;
-        last = key;
+        uint64_t& before = visited[key * 0x9e3779b97f4a7c15u >> (64 - kVisitedBits)];
+        if (key == before) continue;
+        if (!visit(key)) return false;
+        before = key;
       }
     }
   }
   return true;
 }
 
-void fuse(tv_room& room, const RoomView& view, uint32_t added_at, bool subtract) {
-  const Fusion f = fusion_of(room, view);
-  const bool sees_through = f.view.map.inferred == 0;
-  for (int32_t k = 0; k < room.num_near; ++k) {
-    if (room.blocks[room.near[k]].born_at <= added_at) fuse_block(f, room.near[k], true, subtract);
-  }
-  for (int32_t index = 0; sees_through && index < room.end_blocks; ++index) {
-    const Block& block = room.blocks[index];
-    if (block.key == 0 || block.used_at == room.num_calls || block.born_at > added_at) continue;
-    if (may_see(f, index)) fuse_block(f, index, false, subtract);
-  }
-  for (int32_t k = 0; k < room.num_near; ++k) {
-    if (!has_surface(room, room.near[k], 1)) free_block(room, room.near[k]);
-  }
-}
-
-uint64_t mix(uint64_t digest, uint64_t word) {
-  digest = (digest ^ word) * 0x9e3779b97f4a7c15u;
-  return digest ^ digest >> 29;
-}
-
-uint64_t digest_bytes(uint64_t digest, const void* bytes, size_t count) {
-  const uint8_t* b = static_cast<const uint8_t*>(bytes);
-  for (; count > 0;) {
-    const size_t part = count < 8 ? count : 8;
-    uint64_t word = part;
-    std::memcpy(&word, b, part);
-    digest = mix(digest, word);
-    b += part, count -= part;
-  }
-  return digest;
-}
-
-uint64_t digest_rows(uint64_t digest, const void* data, size_t row_bytes, int64_t stride_bytes,
-                     int32_t rows) {
-  for (int32_t y = 0; data != nullptr && y < rows; ++y) {
-    digest = digest_bytes(digest, static_cast<const uint8_t*>(data) + y * stride_bytes, row_bytes);
-  }
-  return mix(digest, data != nullptr);
-}
-
-}  // namespace
-
-Measured measured_at(const tv_room& room, const RoomView& view, int32_t x, int32_t y) {
-  return measured_at(fusion_of(room, view), x, y);
-}
-
-uint64_t digest_of(const RoomView& view) {
-  const tv_depth_map& map = view.map;
-  const size_t width = static_cast<size_t>(map.width);
-  uint64_t digest = mix(0x7477, static_cast<uint64_t>(map.inferred));
-  digest = digest_bytes(digest, &view.camera.model, sizeof view.camera.model);
-  digest = digest_bytes(digest, view.rotation.data(), 9 * sizeof(double));
-  digest = digest_bytes(digest, view.centre.data(), 3 * sizeof(double));
-  digest = digest_rows(digest, map.distance, 4 * width, int64_t{4} * map.stride, map.height);
-  digest = digest_rows(digest, map.sigma, 4 * width, int64_t{4} * map.stride, map.height);
-  digest = digest_rows(digest, map.witnesses, width, map.stride, map.height);
-  digest = digest_rows(digest, map.mask, width, map.mask_stride_bytes, map.height);
-  const size_t channels = map.pixels != nullptr ? static_cast<size_t>(map.channels) : 0;
-  return digest_rows(digest, map.pixels, width * channels, map.pixel_stride_bytes, map.height);
-}
-
-bool list_near_blocks(tv_room& room, const RoomView& view, bool make) {
+// Lists the blocks near the view's surface in room.near. make: those that the room lacks are made;
+// where there is no memory for them, it returns false and leaves the room as it was.
+bool list_near_blocks(tv_room& room, const Fusion& f, bool make) {
   ++room.num_calls;
   room.num_near = 0;
-  const bool listed = visit_near(fusion_of(room, view), [&room, make](uint64_t key) {
+  const bool listed = visit_near(f, [&room, make](uint64_t key) {
     int32_t index = find_block(room, key);
     if (index < 0 && !make) return true;
     if (index < 0) index = make_block(room, key);
@@ -332,20 +384,62 @@ bool list_near_blocks(tv_room& room, const RoomView& view, bool make) {
   return listed;
 }
 
-void add_view(tv_room& room, const RoomView& view) { fuse(room, view, room.num_calls, false); }
+// Adds the view to the blocks of room.near, and what it sees through to all others; or subtracts
+// it. Blocks that were made after added_at are left out.
+void fuse(tv_room& room, const Fusion& f, uint32_t added_at, bool subtract) {
+  const bool sees_through = f.view.map.inferred == 0;
+  for (int32_t k = 0; k < room.num_near; ++k) {
+    if (room.blocks[room.near[k]].born_at <= added_at) fuse_block(f, room.near[k], true, subtract);
+  }
+  for (int32_t index = 0; sees_through && index < room.end_blocks; ++index) {
+    const Block& block = room.blocks[index];
+    if (block.key == 0 || block.used_at == room.num_calls || block.born_at > added_at) continue;
+    if (may_see_through(f, index)) fuse_block(f, index, false, subtract);
+  }
+  for (int32_t k = 0; k < room.num_near; ++k) {
+    if (!has_surface(room, room.near[k], 1)) free_block(room, room.near[k]);
+  }
+}
+
+}  // namespace
+
+bool add_view(tv_room& room, const RoomView& view) {
+  const Fusion f = fusion_of(room, view);
+  if (!list_near_blocks(room, f, true)) return false;
+  fuse(room, f, room.num_calls, false);
+  return true;
+}
 
 void subtract_view(tv_room& room, const RoomView& view, uint32_t added_at) {
-  fuse(room, view, added_at, true);
+  const Fusion f = fusion_of(room, view);
+  list_near_blocks(room, f, false);
+  fuse(room, f, added_at, true);
 }
 
 void add_to_new_blocks(tv_room& room, const RoomView& view, uint32_t added_at) {
-  list_near_blocks(room, view, false);
   const Fusion f = fusion_of(room, view);
+  const bool inferred = view.map.inferred != 0;
+  ++room.num_calls;
+  const auto is_new = [&room, added_at](const Block& block) {
+    return block.key != 0 && block.born_at > added_at;
+  };
+  bool any_near = false;
+  for (int32_t index = 0; index < room.end_blocks && !any_near; ++index) {
+    const Block& block = room.blocks[index];
+    any_near = is_new(block) && place_of(block.key).inferred == inferred && may_be_near(f, index);
+  }
+  if (any_near) {
+    visit_near(f, [&room](uint64_t key) {
+      const int32_t index = find_block(room, key);
+      if (index >= 0) room.blocks[index].used_at = room.num_calls;
+      return true;
+    });
+  }
   for (int32_t index = 0; index < room.end_blocks; ++index) {
     const Block& block = room.blocks[index];
-    if (block.key == 0 || block.born_at <= added_at) continue;
+    if (!is_new(block)) continue;
     const bool near = block.used_at == room.num_calls;
-    if (near || (view.map.inferred == 0 && may_see(f, index))) fuse_block(f, index, near, false);
+    if (near || (!inferred && may_see_through(f, index))) fuse_block(f, index, near, false);
   }
 }
 

@@ -138,12 +138,12 @@ struct Votes {
 // Counts a measured pixel. Returns the plane that it lies on, kOnNone, or kNotMeasured.
 constexpr int32_t kOnNone = -1, kNotMeasured = -2;
 
-int32_t vote(const tv_room& room, const RoomView& view, const InferRequest& request, int32_t at,
-             Votes* votes) {
-  const Measured m = measured_at(room, view, at % view.map.width, at / view.map.width);
+int32_t vote(const Readings& readings, const RoomView& view, const InferRequest& request,
+             int32_t at, Votes* votes) {
+  const Measured m = measured_at(readings, at % view.map.width, at / view.map.width);
   Sight sight;
   if (m.weight == 0 || !sight_at(view, at, &sight)) return kNotMeasured;
-  const double most = kNearSigmas * m.sigma + room.options.voxel;
+  const double most = kNearSigmas * m.sigma + readings.voxel;
   int32_t best = kOnNone;
   double least = most;
   for (int32_t p = 0; p < request.num_planes; ++p) {
@@ -176,11 +176,11 @@ bool is_measured(const tv_room& room, const double point[3]) {
 }
 
 // Counts what was measured first on the way from a pixel outwards.
-void vote_beyond(const tv_room& room, const RoomView& view, const InferRequest& request, int32_t x,
-                 int32_t y, int32_t dx, int32_t dy, Votes* votes) {
+void vote_beyond(const Readings& readings, const RoomView& view, const InferRequest& request,
+                 int32_t x, int32_t y, int32_t dx, int32_t dy, Votes* votes) {
   for (int32_t k = 0; k < kEdgeReach; ++k, x += dx, y += dy) {
     if (x < 0 || y < 0 || x >= view.map.width || y >= view.map.height) break;
-    if (vote(room, view, request, y * view.map.width + x, votes) != kNotMeasured) break;
+    if (vote(readings, view, request, y * view.map.width + x, votes) != kNotMeasured) break;
   }
 }
 
@@ -194,7 +194,7 @@ bool may_be_of(const Votes& votes, int32_t plane) {
 }
 
 // Collects the region of plain pixels around a pixel, and what was measured in it and at its edge.
-int32_t grow(const tv_room& room, const RoomView& view, const InferRequest& request,
+int32_t grow(const Readings& readings, const RoomView& view, const InferRequest& request,
              const Picture& picture, int32_t from, Votes* votes) {
   const int32_t w = picture.width, h = picture.height;
   int32_t size = 0;
@@ -210,7 +210,7 @@ int32_t grow(const tv_room& room, const RoomView& view, const InferRequest& requ
         picture.state[n] = kTaken;
         picture.region[size++] = n;
       } else if (picture.state[n] == kTextured) {
-        vote_beyond(room, view, request, x + dx, y + dy, dx, dy, votes);
+        vote_beyond(readings, view, request, x + dx, y + dy, dx, dy, votes);
         ++votes->edge;
       }
     }
@@ -228,6 +228,7 @@ size_t infer_bytes(int32_t width, int32_t height) {
 int32_t infer_distances(const tv_room& room, const RoomView& view, const InferRequest& request,
                         Arena& arena, float* distance, float* sigma) {
   const tv_depth_map& map = view.map;
+  const Readings readings = readings_of(room, view);
   const size_t pixels = static_cast<size_t>(map.width) * static_cast<size_t>(map.height);
   Picture picture = {map.width, map.height, arena_alloc<uint8_t>(arena, pixels),
                      arena_alloc<uint8_t>(arena, pixels), arena_alloc<int32_t>(arena, pixels)};
@@ -240,9 +241,9 @@ int32_t infer_distances(const tv_room& room, const RoomView& view, const InferRe
   for (int32_t from = 0; from < static_cast<int32_t>(pixels); ++from) {
     if (picture.state[from] != kPlain) continue;
     Votes votes = {};
-    const int32_t size = grow(room, view, request, picture, from, &votes);
+    const int32_t size = grow(readings, view, request, picture, from, &votes);
     for (int32_t k = 0; k < size; ++k) {
-      const int32_t plane = vote(room, view, request, picture.region[k], &votes);
+      const int32_t plane = vote(readings, view, request, picture.region[k], &votes);
       votes.measured += plane != kNotMeasured;
       votes.off += plane == kOnNone;
     }
@@ -250,8 +251,7 @@ int32_t infer_distances(const tv_room& room, const RoomView& view, const InferRe
     for (int32_t k = 0; k < size; ++k) {
       const int32_t at = picture.region[k];
       Sight sight;
-      if (measured_at(room, view, at % map.width, at / map.width).weight > 0 ||
-          !sight_at(view, at, &sight)) {
+      if (is_known(readings, at % map.width, at / map.width) || !sight_at(view, at, &sight)) {
         continue;
       }
       // In a room the nearest of the planes is the one that is seen.

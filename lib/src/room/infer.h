@@ -4,7 +4,7 @@
 #include <cstddef>
 
 #include "base/arena.h"
-#include "room/fuse.h"
+#include "room/readings.h"
 
 namespace tv {
 
