@@ -168,6 +168,15 @@ class Evaluate(cli.CliTest):
             done = self.succeed(self.evaluate(pair_line(T=T), "--poses", poses))
             self.assertEqual((own in done.stdout, listed in done.stdout), (is_own, not is_own))
 
+    def test_a_list_that_the_poses_contradict_or_that_stands_is_named(self):
+        ahead, still = list(SIDEWAYS), list(SIDEWAYS)
+        ahead[3], ahead[11], still[3] = 0, 1, 0
+        done = self.succeed(self.evaluate(3 * pair_line(T=ahead) + 2 * pair_line(T=still)))
+        self.assertIn(b"3 of 5 poses that are ok lie more than three of their", done.stdout)
+        self.assertIn(b"the true poses of 2 of 5 pairs of ", done.stdout)
+        done = self.succeed(self.evaluate(pair_line(T=ahead) + 2 * pair_line()))
+        self.assertNotIn(b"note ", done.stdout)
+
     def test_without_truth_the_errors_are_null(self):
         line = " ".join(pair_line().split()[:22]) + "\n"
         report = self.report(line)

@@ -301,6 +301,12 @@ class Surfaces(unittest.TestCase):
             with open(path, "w", encoding="utf-8") as file:
                 file.write(header.format("ascii 1.0") + "1 2 3 4\n5 6 7 8\n")
             self.assertEqual(ply.read_ply(path)["red"].tolist(), [4, 8])
+            first = "element edge 1\nproperty float x\nelement vertex"
+            with open(path, "w", encoding="utf-8") as file:
+                file.write(header.format("ascii 1.0").replace("element vertex", first) +
+                           "9\n1 2 3 4\n5 6 7 8\n")
+            with self.assertRaisesRegex(ValueError, "its points are not first, but 'edge'"):
+                ply.read_ply(path)
 
     def test_a_mesh_is_read_whole_or_not_at_all(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -32,6 +32,9 @@ def _read_vertices(file, header, path):
             names.append((words[2], _TYPES[words[1]]))
     if not names:
         raise ValueError(f"{path}: no points")
+    first = next(line.split()[1] for line in header if line.startswith("element "))
+    if first != "vertex":
+        raise ValueError(f"{path}: its points are not first, but '{first}'")
     if form == "binary_little_endian":
         vertex = np.dtype(names)
         data = file.read(count * vertex.itemsize)
