@@ -554,6 +554,21 @@ def test_a_mask_leaves_a_part_of_the_images_out(photographs, tmp_path, call, ref
     refuse(("no mask of", NAMES[0]), *base, *database, "--mask", tmp_path / "masks")
 
 
+@pytest.mark.parametrize("edge,words", [(400, ""), (WIDTH, "leaves nothing out"),
+                                        (160, "leaves 75 % of the picture out: black is")])
+def test_masks_without_black_and_of_much_of_a_picture_are_noted(tmp_path, capfd, edge, words):
+    import cv2
+    from twoview_tools.colmap.masks import Masks
+    mask = np.full((HEIGHT, WIDTH), 255, np.uint8)
+    mask[:, edge:] = 0
+    cv2.imwrite(str(tmp_path / "one.png"), mask)
+    masks = Masks(str(tmp_path / "one.png"))
+    for name in NAMES[:2]:  # one line for all
+        assert masks.of(name, mask) is not None
+    said = capfd.readouterr().err
+    assert said.count("\n") == bool(words) and words in said
+
+
 def test_large_photographs_get_the_advice_to_make_them_smaller(tmp_path, call):
     import cv2
     random = np.random.default_rng(1)

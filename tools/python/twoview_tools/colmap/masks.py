@@ -1,6 +1,7 @@
 """Masks of pictures (--mask): the twin of tools/twoview/files/mask_file.cc."""
 
 import os
+import sys
 
 import numpy as np
 
@@ -25,6 +26,17 @@ def load_mask(path):
     return used
 
 
+def mask_note(mask, name):
+    """A note where the mask leaves nothing out, or more than half; else empty."""
+    left_out = 1 - mask.mean()
+    if left_out == 0:
+        return f"the mask of {name} leaves nothing out: it has no black pixel"
+    if left_out < 0.5:
+        return ""
+    return (f"the mask of {name} leaves {100 * left_out:.3g} % of the picture out: black is what is "
+            f"left out, is it inverted?")
+
+
 class Masks:
     """The mask of every picture: one file that serves all, or a folder with NAME.png (COLMAP's
     a.jpg.png) or STEM.png (a.png) for each picture. Black is left out, anything else is used."""
@@ -32,6 +44,7 @@ class Masks:
     def __init__(self, path=""):
         self.path = path
         self._only = None
+        self._is_noted = False
         if path and not os.path.exists(path):
             raise BadInput(f"--mask: {path}: no such file or folder")
 
@@ -47,6 +60,10 @@ class Masks:
         if mask.shape != luma.shape:
             raise BadInput(f"--mask: {file} is {mask.shape[1]}x{mask.shape[0]}, and picture {name} "
                            f"{luma.shape[1]}x{luma.shape[0]}")
+        note = mask_note(mask, name)
+        if note and not self._is_noted:  # one line, of the first picture
+            self._is_noted = True
+            print(f"twoview: note: {note}", file=sys.stderr)
         return mask
 
     def file_of(self, name):
