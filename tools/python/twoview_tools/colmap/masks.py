@@ -33,8 +33,8 @@ def mask_note(mask, name):
         return f"the mask of {name} leaves nothing out: it has no black pixel"
     if left_out < 0.5:
         return ""
-    return (f"the mask of {name} leaves {100 * left_out:.3g} % of the picture out: black is what is "
-            f"left out, is it inverted?")
+    return (f"the mask of {name} leaves {100 * left_out:.3g} % of the picture out: black is what "
+            f"is left out, is it inverted?")
 
 
 class Masks:
