@@ -131,6 +131,7 @@ static void set_defaults(tvm_estimator_options *options) {
   options->weak_factor = 3;
   options->drift_share = 0.005;
   options->drift_turn_rad = 0.008;
+  options->filter_memory_s = 1;
   memcpy(options->body_from_camera, ahead, sizeof ahead);
 }
 
@@ -155,6 +156,7 @@ tvs_status tvm_estimator_init(tvm_estimator *estimator, const tvm_estimator_opti
       !(options->weak_factor >= 1 && options->weak_factor <= 100) ||
       !(options->drift_share >= 0 && options->drift_share <= 1) ||
       !(options->drift_turn_rad >= 0 && options->drift_turn_rad <= 1) ||
+      !(options->filter_memory_s >= 0 && options->filter_memory_s <= 100) ||
       !is_rotation(options->body_from_camera) || !(length_sq(options->camera_in_body) < 1e6)) {
     return TVS_ERR_ARGUMENT;
   }
@@ -216,7 +218,12 @@ static void count_resets(tvm_estimator *e, const tvm_track *track) {
   if (jumps || was_corrected(e, track)) e->reset_counter = (e->reset_counter + 1) & 255;
   /* The way since the last frame is then not one of the vehicle. */
   if (jumps) e->has_last = 0;
-  if (s->segment != e->last_segment || is_metric != e->was_metric) e->path_m = 0;
+  /* A loop that joins a segment to an older one leads to what all the way since has drifted. */
+  if (s->segment < e->last_segment) {
+    e->path_m = e->way_m;
+  } else if (s->segment > e->last_segment || is_metric != e->was_metric) {
+    e->path_m = 0;
+  }
   e->last_segment = s->segment;
   e->was_metric = is_metric;
 }
@@ -272,12 +279,10 @@ static void turn_to_north(double cosine, double sine, double *v) {
   v[1] = y;
 }
 
-static int quality_of(const tvm_estimate *estimate, int is_weak) {
-  double largest = 0, quality;
-  int k;
-  if (!estimate->has_covariance) return 0;
-  for (k = 0; k < 3; ++k) largest = fmax(largest, estimate->pose_covariance[7 * k]);
-  quality = floor(100 / (1 + largest / (HALF_QUALITY_M * HALF_QUALITY_M)) + 0.5);
+/* `place`: the covariance of the place and the turn, of the error of one message. */
+static int quality_of(const double *place, int is_weak) {
+  const double largest = fmax(fmax(place[0], place[7]), place[14]);
+  double quality = floor(100 / (1 + largest / (HALF_QUALITY_M * HALF_QUALITY_M)) + 0.5);
   if (is_weak && quality > WEAK_QUALITY) quality = WEAK_QUALITY;
   return quality < 1 ? 1 : (int)quality;
 }
@@ -287,6 +292,25 @@ static void add_scale(double sigma, const double *v, double *covariance) {
   int i, j;
   for (i = 0; i < 3; ++i)
     for (j = 0; j < 3; ++j) covariance[6 * i + j] += sigma * sigma * v[i] * v[j];
+}
+
+/* How often the filter counts an error that stays; at least 1. */
+static double messages_in_memory(const tvm_estimator *e, const tvm_track *track) {
+  const double dt = (double)(track->host_ns - e->last_ns) * 1e-9;
+  return dt < e->options.filter_memory_s ? e->options.filter_memory_s / dt : 1;
+}
+
+/* What stays the same from message to message, `times` times: a metre that errs moves all places
+   away from the map's origin together, and the map drifts. */
+static void add_common(const tvm_estimator *e, double scale_sigma, const double *p, double times,
+                       double *covariance) {
+  const double place = e->options.drift_share * e->path_m, turn = e->options.drift_turn_rad;
+  int k;
+  add_scale(scale_sigma * sqrt(times), p, covariance);
+  for (k = 0; k < 3; ++k) {
+    covariance[7 * k] += times * place * place;
+    covariance[7 * (k + 3)] += times * turn * turn;
+  }
 }
 
 /* Velocity and rate by the difference to the last pose; `now` and `last` are the covariances of the
@@ -329,7 +353,8 @@ static void add_velocity(tvm_estimator *e, const tvm_track *track, const double 
     put_block(J, 0, 3, by_turn, 1);
     propagate(J, now, shares);
     for (k = 0; k < 36; ++k) out->velocity_covariance[k] += shares[k];
-    add_scale(track->state->scale_sigma, out->velocity_m_s, out->velocity_covariance);
+    add_scale(track->state->scale_sigma * sqrt(messages_in_memory(e, track)), out->velocity_m_s,
+              out->velocity_covariance);
     for (k = 0; k < 3; ++k) {
       out->velocity_covariance[7 * k] += change_v / 4;
       out->velocity_covariance[7 * (k + 3)] += change_w / 4;
@@ -347,6 +372,7 @@ static void add_way(tvm_estimator *e, const tvm_track *track) {
   int k;
   for (k = 0; k < 3; ++k) step[k] = track->state->world_from_cam_t[k] - from[k];
   e->path_m += sqrt(length_sq(step));
+  e->way_m += sqrt(length_sq(step));
 }
 
 static void keep_pose(tvm_estimator *e, const tvm_track *track) {
@@ -370,7 +396,7 @@ static void estimate_of(tvm_estimator *e, const tvm_track *track, tvm_estimate *
   const tv_odometry_state *s = track->state;
   const int is_weak = s->status == TV_ODOMETRY_WEAK;
   double R[9], p[3], last_R[9], last_p[3], now[36] = {0}, last[36] = {0};
-  int k;
+  int k, quality;
   body_pose(e, s->world_from_cam_R, s->world_from_cam_t, R, p);
   body_pose(e, has_previous(track) ? track->previous_R : e->last_R,
             has_previous(track) ? track->previous_t : e->last_t, last_R, last_p);
@@ -380,13 +406,9 @@ static void estimate_of(tvm_estimator *e, const tvm_track *track, tvm_estimate *
     body_covariance(e, e->last_R, last_R, e->last_covariance, last);
   }
   add_velocity(e, track, R, p, now, last_R, last_p, last, out);
-  /* A metre that errs moves all places away from the map's origin together; and the map drifts. */
-  add_scale(s->scale_sigma, p, now);
-  for (k = 0; k < 3; ++k) {
-    const double place = e->options.drift_share * e->path_m, turn = e->options.drift_turn_rad;
-    now[7 * k] += place * place;
-    now[7 * (k + 3)] += turn * turn;
-  }
+  add_common(e, s->scale_sigma, p, 1, now);
+  quality = quality_of(now, is_weak);
+  add_common(e, s->scale_sigma, p, messages_in_memory(e, track) - 1, now);
   if (e->options.world == TVM_WORLD_NED) {
     const double c = cos(track->heading_rad), n = sin(track->heading_rad);
     const double about_z[9] = {c, -n, 0, n, c, 0, 0, 0, 1};
@@ -408,7 +430,7 @@ static void estimate_of(tvm_estimator *e, const tvm_track *track, tvm_estimate *
   }
   memcpy(out->position_m, p, sizeof p);
   quaternion_of(R, out->world_from_body);
-  out->quality = quality_of(out, is_weak);
+  out->quality = out->has_covariance ? quality : 0;
   out->world = e->options.world;
   out->time_us = track->time_us;
 }

@@ -20,7 +20,8 @@ static tvm_estimate estimate;
 
 void setUp(void) {
   tvm_estimator_options_init(&options);
-  options.drift_share = options.drift_turn_rad = 0; /* but in the test of these */
+  /* But in the tests of these. */
+  options.drift_share = options.drift_turn_rad = options.filter_memory_s = 0;
   memset(&state, 0, sizeof state);
   state.struct_size = sizeof state;
   state.status = TV_ODOMETRY_TRACKING;
@@ -267,6 +268,30 @@ static void test_the_map_drifts_with_the_way(void) {
   next(40);
   next(40);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.02 * 0.02, estimate.pose_covariance[7]);
+  state.segment = 0; /* joined to the older one again */
+  next(40);
+  next(40);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.02 * 0.02 + 0.02 * 0.02, estimate.pose_covariance[7]);
+}
+
+/* At 25 messages a second a filter that averages over a second counts an error that stays 25 times
+   as if it were new. What is new each time stays as it is, and so does the quality. */
+static void test_what_stays_is_sent_as_often_as_the_filter_counts_it(void) {
+  options.drift_share = 0.005;
+  options.drift_turn_rad = 0.008;
+  options.filter_memory_s = 1;
+  begin();
+  set_covariance(0.001, 0.02);
+  state.scale_sigma = 0.01;
+  update();
+  set_place(2, 0, 0);
+  next(40);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.02 * 0.02 + 25 * (0.01 * 0.01 + 0.02 * 0.02),
+                            estimate.pose_covariance[0]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.02 * 0.02 + 25 * 0.01 * 0.01, estimate.pose_covariance[7]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.001 * 0.001 + 25 * 0.008 * 0.008,
+                            estimate.pose_covariance[35]);
+  TEST_ASSERT_EQUAL_INT(92, estimate.quality); /* of 0.02, 0.01 and 0.02 m */
 }
 
 /* Two places of 0.02 m each over 50 ms; the velocity did not change, and the attitude is exact. */
@@ -842,6 +867,9 @@ static void test_bad_arguments_are_refused_and_change_nothing(void) {
   options.weak_factor = 0.5;
   TEST_ASSERT_EQUAL_INT(TVS_ERR_ARGUMENT, tvm_estimator_init(&estimator, &options));
   options.weak_factor = 3;
+  options.filter_memory_s = -1;
+  TEST_ASSERT_EQUAL_INT(TVS_ERR_ARGUMENT, tvm_estimator_init(&estimator, &options));
+  options.filter_memory_s = 0;
   options.body_from_camera[0] = 1;
   TEST_ASSERT_EQUAL_INT(TVS_ERR_ARGUMENT, tvm_estimator_init(&estimator, &options));
   TEST_ASSERT_EQUAL_INT(TVS_ERR_NULL, tvm_estimator_init(NULL, &options));
@@ -859,6 +887,7 @@ int main(void) {
   RUN_TEST(test_so_it_is_in_a_world_that_is_turned_to_north);
   RUN_TEST(test_a_metre_that_errs_grows_with_the_distance);
   RUN_TEST(test_the_map_drifts_with_the_way);
+  RUN_TEST(test_what_stays_is_sent_as_often_as_the_filter_counts_it);
   RUN_TEST(test_the_velocity_errs_by_both_places_and_by_what_changed);
   RUN_TEST(test_the_quality_falls_with_the_place_and_a_weak_frame_grows);
   RUN_TEST(test_what_is_not_known_is_not_sent);

@@ -91,6 +91,11 @@ typedef struct tvm_estimator_options {
      of the attitude about each axis, radians. Defaults 0.005 and 0.008: twice the root mean square
      of three rendered flights of 12 to 15 m (0.0026 and 0.0042). */
   double drift_share, drift_turn_rad;
+  /* Over how many seconds the filter averages what it gets, [0, 100]. It counts the error of each
+     message as new, and what drifts, and the metre's error, stay the same from one to the next: so
+     their variances are sent times the messages in this time. 0: they are not. Default 1: some
+     0.3 s by the noises of PX4 and ArduPilot, and more after a pause. */
+  double filter_memory_s;
 } tvm_estimator_options;
 
 /* Writes the defaults into a struct of struct_size bytes; null is allowed. */
@@ -159,9 +164,9 @@ typedef struct tvm_estimator {
   int64_t last_ns;
   /* Of the last pose in metres: world_from_cam, and the covariance of tv_odometry_state. */
   double last_R[9], last_t[3], last_covariance[36];
-  /* The way since the segment began in metres, and the variances of the last pose, of all axes
-     together. */
-  double path_m, last_place_sq, last_turn_sq;
+  /* The way since the segment began and that of all segments, in metres, and the variances of the
+     last pose, of all axes together. */
+  double path_m, way_m, last_place_sq, last_turn_sq;
   /* The last velocity and angular rate, along the axes of the world. */
   double last_velocity[3], last_rate[3];
   /* What tvm_session_send_track sent last, and when. */

@@ -47,8 +47,9 @@ class SetWriter:
         """A picture in place of frame k, compressed as its file's ending says."""
         import cv2
         name = f"images/{k:05d}{ending}"
-        if not cv2.imwrite(os.path.join(self.folder, name), picture,
-                           [cv2.IMWRITE_JPEG_QUALITY, 92, cv2.IMWRITE_PNG_COMPRESSION, 1]):
+        how = ([cv2.IMWRITE_PNG_COMPRESSION, 1] if ending == ".png"
+               else [cv2.IMWRITE_JPEG_QUALITY, 92])
+        if not cv2.imwrite(os.path.join(self.folder, name), picture, how):
             raise OSError(f"cannot write {self.folder}/{name}")
         self._add(k, name)
 
