@@ -96,15 +96,19 @@ DepthSweep::DepthSweep(const tv_camera& camera, const tv_depth_options& options)
   const tv_camera small = resized(camera_, reduced_.width, reduced_.height);
   map_x_.create(height, width, CV_32F);
   map_y_.create(height, width, CV_32F);
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      const double ray[3] = {(x - map_camera_.cx) / map_camera_.fx,
-                             (y - map_camera_.cy) / map_camera_.fy, 1};
-      double pixel[2] = {-1e6, -1e6};
-      tv_camera_project(&small, ray, pixel, nullptr);
-      map_x_.at<float>(y, x) = static_cast<float>(pixel[0]);
-      map_y_.at<float>(y, x) = static_cast<float>(pixel[1]);
-    }
+  std::vector<double> rays, places(2 * count);
+  std::vector<uint8_t> inside(count);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x)
+      rays.insert(rays.end(), {(x - map_camera_.cx) / map_camera_.fx,
+                               (y - map_camera_.cy) / map_camera_.fy, 1});
+  check(tv_camera_project_points(&small, rays.data(), static_cast<int32_t>(count), places.data(),
+                                 inside.data()),
+        "cannot make depth maps");
+  constexpr float kNowhere = -1e6f;
+  for (size_t i = 0; i < count; ++i) {
+    map_x_.ptr<float>()[i] = inside[i] != 0 ? static_cast<float>(places[2 * i]) : kNowhere;
+    map_y_.ptr<float>()[i] = inside[i] != 0 ? static_cast<float>(places[2 * i + 1]) : kNowhere;
   }
 }
 

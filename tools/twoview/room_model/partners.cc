@@ -68,15 +68,23 @@ std::vector<Candidate> candidates(const RoomScene& scene, size_t key, double med
 DepthRange depth_range(const RoomScene& scene, const RoomView& view) {
   const tv_camera& camera = scene.camera;
   const Matrix3 cam_from_world = transposed(view.R);
-  std::vector<double> depths;
+  std::vector<double> ahead;
   for (const Vector3& point : scene.points) {
     Vector3 x = point;
     for (size_t axis = 0; axis < 3; ++axis) x[axis] -= view.t[axis];
     x = applied(cam_from_world, x);
-    double pixel[2];
-    if (!(x[2] > 0) || tv_camera_project(&camera, x.data(), pixel, nullptr) != TV_OK) continue;
-    if (pixel[0] >= 0 && pixel[1] >= 0 && pixel[0] < camera.width && pixel[1] < camera.height)
-      depths.push_back(x[2]);
+    if (x[2] > 0) ahead.insert(ahead.end(), x.begin(), x.end());
+  }
+  const size_t count = ahead.size() / 3;
+  std::vector<double> pixels(2 * count), depths;
+  std::vector<uint8_t> inside(count);
+  if (tv_camera_project_points(&camera, ahead.data(), static_cast<int32_t>(count), pixels.data(),
+                               inside.data()) != TV_OK)
+    return {};
+  for (size_t k = 0; k < count; ++k) {
+    const double u = pixels[2 * k], v = pixels[2 * k + 1];
+    if (inside[k] != 0 && u >= 0 && v >= 0 && u < camera.width && v < camera.height)
+      depths.push_back(ahead[3 * k + 2]);
   }
   if (depths.size() < kFewestPoints) return {};
   std::sort(depths.begin(), depths.end());
