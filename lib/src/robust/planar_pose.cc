@@ -58,7 +58,8 @@ void choose_planar_pose(Fit& f, const Rivals& rivals) {
         (poses[k].R - poses[best].R).squaredNorm() + (poses[k].t - poses[best].t).squaredNorm();
     // One of the other two may be the best pose again, where its refinement stopped near the same
     // flat minimum; so the most different pose is taken.
-    if (k != best && turned > farthest && !matches_decide(f, poses[k], inliers[best])) {
+    if (k == best || turned <= farthest) continue;
+    if (10 * inliers[k] >= 9 * inliers[best] || !matches_decide(f, poses[k], inliers[best])) {
       other = k;
       farthest = turned;
     }
