@@ -98,12 +98,12 @@ def test_files_of_several_cameras(tmp_path, format):
 def test_sigmas(tmp_path, format):
     path, camera = tmp_path / "camera", tv.Camera(64, 48, 50, 51, 31.5, 23.5)
     tv.write_cameras(path, camera, format)
-    assert tv.read_sigmas(path) == tv.PLAIN_FILE == (0.01, 0.005)
-    tv.write_cameras(path, camera, format, tv.CalibrationSigmas(0.0007, 0.0003))
-    assert tv.read_sigmas(path) == (0.0007, 0.0003) and tv.read_camera(path) == camera
+    assert tv.read_calibration(path) == tv.PLAIN_FILE == (0.01, 0.005, tv.Refine.FOCAL_LENGTH)
+    tv.write_cameras(path, camera, format, tv.Calibration(0.0007, 0.0003))
+    assert tv.read_calibration(path)[:2] == (0.0007, 0.0003) and tv.read_camera(path) == camera
     path.write_text(path.read_text().replace("0.0007", "0.7"))
     with pytest.raises(tv.FormatError, match=r"focal_sigma is not in \[0, 0.5\]"):
-        tv.read_sigmas(path)
+        tv.read_calibration(path)
     for other in ("kalibr", "cameras.yaml", "colmap"):
         with pytest.raises(ValueError, match=other):
             tv.write_cameras(path, camera, other, tv.PLAIN_FILE)

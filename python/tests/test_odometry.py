@@ -63,8 +63,10 @@ def test_the_path_is_the_flown_one(flight):
 def test_the_camera_is_as_given_where_nothing_contradicts_it(flight):
     odometry, states = flight
     assert odometry.camera == CAMERA and not states[-1].principal_point_shift_px.any()
-    with tv.Odometry(CAMERA, correct_camera=False) as kept:
+    with tv.Odometry(CAMERA, refine=tv.Refine.NOTHING) as kept:
         assert kept.camera == CAMERA
+    with pytest.raises(tv.TV_ERR_ARGUMENT):
+        tv.Odometry(CAMERA, refine=tv.Refine.FOCAL_LENGTH)
 
 
 def test_the_map_is_consistent(flight):

@@ -94,8 +94,8 @@ def test_a_result_is_of_the_corrected_camera(context):
     t = np.array([1.2, 0.3, 0.6])
     pixels = [tv.camera_project_points(right, np.ascontiguousarray(part))[0]
               + random.normal(0, 0.1, (400, 2)) for part in (points, points @ R.T + t)]
-    found, inliers = tv.estimate_two_view(context, wrong, wrong, *pixels,
-                                          principal_point_sigma=0.01)
+    doubtful = tv.Calibration(center_sigma=0.01, refine=tv.Refine.PRINCIPAL_POINT)
+    found, inliers = tv.estimate_two_view(context, wrong, wrong, *pixels, calibration1=doubtful)
     assert np.abs(found.principal_point_shift - (5.5, -3.5)).max() < 1.5
     corrected = tv.corrected_camera(found, wrong)
     dx, dy = found.principal_point_shift
@@ -117,7 +117,12 @@ def test_a_result_is_of_the_corrected_camera(context):
     assert unknown.principal_point_chi2 is None and unknown.principal_point_asked_px is None
     assert unknown.principal_point_asked_covariance is None
     with pytest.raises(tv.TV_ERR_ARGUMENT):
-        tv.estimate_two_view(context, wrong, wrong, *pixels, principal_point_sigma=0.2)
+        tv.estimate_two_view(context, wrong, wrong, *pixels,
+                             calibration0=doubtful._replace(center_sigma=0.2))
+    for value in (0.01, (0.01, 0), tv.Calibration("0.01"), tv.Calibration(refine=0.5)):
+        with pytest.raises(TypeError, match="option calibration1: .* is not what it takes"):
+            tv.EstimateOptions(calibration1=value)
+            tv.estimate_two_view(context, wrong, wrong, *pixels, calibration1=value)
 
 
 def test_pixels_that_are_not_finite_are_no_inliers(context, scene):

@@ -29,16 +29,16 @@ from ._abi import (CORRESPONDENCE, DENSE_POINT, DESCRIPTOR_BYTES, DISTANCE_PRIOR
                    TV_ERR_STRIDE, TV_ERR_STRUCT_SIZE, TV_ERR_TIME, WINDOW_VIEW, Library,
                    StatusError, default_library)
 from .absolute_pose import AbsolutePose, estimate_absolute_pose
-from .camera import (Camera, camera_check, camera_project_points, camera_scale,
+from .camera import (Calibration, Camera, camera_check, camera_project_points, camera_scale,
                      camera_undistort, camera_unproject_points, camera_valid_angle)
-from .camera_files import (FILM, PLAIN_FILE, CalibrationSigmas, CameraFileWarning, FormatError,
-                           format_cameras, parse_cameras, read_camera, read_cameras, read_sigmas,
+from .camera_files import (FILM, PLAIN_FILE, CameraFileWarning, FormatError, format_cameras,
+                           parse_cameras, read_calibration, read_camera, read_cameras,
                            write_cameras)
 from .context import Context
 from .dense import densify
 from .depth_map import DepthMap, sweep_depth
 from .enums import (CameraModel, Kernels, Kind, Loss, MapReason, Normalisation, OdometryStatus,
-                    Orientation, PathOrigin, PointStatus, Purpose, Reason, RoomPlaneKind,
+                    Orientation, PathOrigin, PointStatus, Purpose, Reason, Refine, RoomPlaneKind,
                     ScaleSource, Solver, Stage, Status, Triangulation, Verdict)
 from .odometry import Keyframe, Odometry, OdometryState
 from .options import (AbsolutePoseOptions, BundleOptions, DenseOptions, DepthOptions,
@@ -73,7 +73,7 @@ if not _typing.TYPE_CHECKING:  # or a type checker would accept every unknown na
 # A type checker reads this list; a test compares it with the imports above.
 __all__ = [
     "AbsolutePose", "AbsolutePoseOptions", "BundleOptions", "BundleResult", "CORRESPONDENCE",
-    "CalibrationSigmas", "Camera", "CameraFileWarning", "CameraModel", "Context",
+    "Calibration", "Camera", "CameraFileWarning", "CameraModel", "Context",
     "DENSE_POINT", "DESCRIPTOR_BYTES", "DISTANCE_PRIOR", "DenseOptions", "DepthMap",
     "DepthOptions", "EstimateOptions", "FILM", "FeatureOptions", "FormatError",
     "GRAVITY_PRIOR", "GuidedOptions", "KEYPOINT", "Kernels", "Keyframe", "Kind", "Library",
@@ -82,6 +82,7 @@ __all__ = [
     "Odometry", "OdometryOptions", "OdometryState", "OdometryStatus", "Orientation",
     "PLAIN_FILE", "POINT", "POSE_PRIOR", "Path", "PathOrigin", "PathPose", "PointStatus",
     "Purpose", "ROOM_DEFAULT_BYTES", "ROOM_PLANE", "ROOM_VERTEX", "Reason", "Reconstruction",
+    "Refine",
     "Room", "RoomInferOptions",
     "RoomMesh", "RoomMeshOptions", "RoomOptions", "RoomPlaneKind", "RoomPlaneOptions",
     "RoomState", "ScaleSource", "Solver", "Stage", "Status", "StatusError", "TV_ERR_ALIGNMENT",
@@ -98,5 +99,5 @@ __all__ = [
     "estimate_absolute_pose", "estimate_two_view", "extract", "format_cameras",
     "keypoint_shapes", "keypoint_sigmas", "match", "match_guided", "orient", "parse_cameras",
     "point_covariances",
-    "read_camera", "read_cameras", "read_sigmas", "reconstruct", "sweep_depth", "triangulate",
+    "read_calibration", "read_camera", "read_cameras", "reconstruct", "sweep_depth", "triangulate",
     "version_string", "write_cameras"]

@@ -40,6 +40,11 @@ class tv_camera(Structure):
                 ("k", c_double * 8)]
 
 
+class tv_calibration(Structure):
+    _fields_ = [("focal_sigma", c_double), ("center_sigma", c_double), ("refine", c_uint32),
+                ("reserved", c_uint32)]
+
+
 class tv_camera_pair(Structure):
     _fields_ = [("camera0", tv_camera), ("camera1", tv_camera),
                 ("cam1_from_cam0_R", c_double * 9), ("cam1_from_cam0_t", c_double * 3)]
@@ -92,9 +97,7 @@ class tv_estimate_options(Structure):
                 ("confidence", c_double), ("max_iterations", c_int32),
                 ("fixed_iterations", c_int32), ("seed", c_uint64), ("gravity0", c_double * 3),
                 ("gravity1", c_double * 3), ("gravity_sigma_rad", c_double),
-                ("principal_point_sigma", c_double),
-                ("focal_sigma0", c_double), ("focal_sigma1", c_double),
-                ("center_sigma0", c_double), ("center_sigma1", c_double),
+                ("calibration0", tv_calibration), ("calibration1", tv_calibration),
                 ("readout_turn_sigma_rad", c_double), ("num_trials", c_int32),
                 ("reserved", c_int32)]
 
@@ -241,7 +244,7 @@ class tv_window_result(Structure):
 class tv_odometry_options(Structure):
     _fields_ = [("struct_size", c_uint32), ("max_keypoints", c_int32), ("max_keyframes", c_int32),
                 ("max_points", c_int32), ("window", c_int32), ("kernels", c_int32),
-                ("seed", c_uint64), ("correct_camera", c_int32), ("reserved", c_int32)]
+                ("seed", c_uint64), ("refine", c_uint32), ("reserved", c_int32)]
 
 
 class tv_odometry_frame(Structure):
@@ -380,18 +383,18 @@ class tv_room_infer_options(Structure):
                 ("num_planes", c_int32), ("reserved", c_int32)]
 
 
-STRUCTS = [tv_limits, tv_image, tv_camera, tv_camera_pair, tv_epipolar, tv_keypoint, tv_features,
-           tv_feature_options, tv_correspondence, tv_match_options, tv_guided_options,
+STRUCTS = [tv_limits, tv_image, tv_camera, tv_calibration, tv_camera_pair, tv_epipolar, tv_keypoint,
+           tv_features, tv_feature_options, tv_correspondence, tv_match_options, tv_guided_options,
            tv_pixel_pairs, tv_estimate_options, tv_two_view, tv_evidence, tv_point, tv_view,
            tv_reconstruct_options, tv_reconstruction, tv_bundle_options, tv_bundle_result,
            tv_pixel_points, tv_absolute_pose_options, tv_absolute_pose, tv_window_view,
            tv_observation, tv_pose_prior, tv_gravity_prior, tv_distance_prior, tv_window,
            tv_window_options, tv_window_result, tv_odometry_options, tv_odometry_frame,
            tv_odometry_state, tv_keyframe, tv_path_frame, tv_path_pose, tv_map_point,
-           tv_map_observation, tv_dense_options,
-           tv_dense_point, tv_depth_options, tv_depth_view, tv_depth_arrays, tv_room_options,
-           tv_depth_map, tv_room_state, tv_room_vertex, tv_room_triangle, tv_room_mesh_options,
-           tv_room_plane, tv_room_plane_options, tv_room_infer_options]
+           tv_map_observation, tv_dense_options, tv_dense_point, tv_depth_options, tv_depth_view,
+           tv_depth_arrays, tv_room_options, tv_depth_map, tv_room_state, tv_room_vertex,
+           tv_room_triangle, tv_room_mesh_options, tv_room_plane, tv_room_plane_options,
+           tv_room_infer_options]
 
 KEYPOINT = np.dtype(tv_keypoint)
 CORRESPONDENCE = np.dtype(tv_correspondence)
@@ -539,21 +542,26 @@ class Library:
 
 
 def set_field(struct: Any, name: str, value: Any) -> None:
-    """Sets a field to a number, or to three numbers. The exception names a wrong field or type."""
+    """Sets a field to a number, to three numbers, or, a struct, to a named tuple. The exception
+    names a wrong field or type."""
     kinds = dict(struct._fields_)
     if name not in kinds or name == "struct_size":
         known = ", ".join(k for k in kinds if k != "struct_size")
         raise TypeError(f"{type(struct).__name__} has no option {name!r}; it has {known}")
-    kind = kinds[name]
+    kind, given = kinds[name], value
     try:
-        if issubclass(kind, ctypes.Array):
+        if issubclass(kind, Structure):
+            parts, value = value._asdict(), kind()
+            for part, number in parts.items():
+                set_field(value, part, number)
+        elif issubclass(kind, ctypes.Array):
             value = kind(*small_array(name, value, kind._length_))
         elif kind in (c_float, c_double):
             value = float(value + 0.0)  # adding 0.0 raises TypeError for a string
         else:
             value = operator.index(value)
-    except TypeError:
-        raise TypeError(f"option {name}: {value!r} is not what it takes") from None
+    except (AttributeError, TypeError):
+        raise TypeError(f"option {name}: {given!r} is not what it takes") from None
     if kind in (c_int32, c_uint32, c_uint64) and kind(value).value != value:
         raise ValueError(f"option {name}: {value} is out of range")
     setattr(struct, name, value)

@@ -37,7 +37,7 @@ MODEL = ("distortion_model", "camera_model", "model_type", "camera_type", "lens_
          "distortion_type", "projection_model", "model", "type")
 FISHEYE = ("fisheye_model", "fisheye", "is_fisheye", "use_fisheye")
 RECTIFICATION, PROJECTION = ("rectification_matrix", "r"), ("projection_matrix", "p")
-SIGMAS = ("focal", "center")  # of focal_sigma and center_sigma
+SIGMAS = ("focal_sigma", "center_sigma")
 
 # What the words of MODEL say of the lens. PINHOLE says nothing of it: Kalibr's camera_model is
 # "pinhole" beside any distortion_model.
@@ -532,11 +532,11 @@ def _rectified(entries: Entries, K: Sequence[float]) -> list[str]:
             if entry is not None and entry.value != same]
 
 
-def sigmas_of(entries: Entries) -> dict[str, float]:
-    """The values of focal_sigma and center_sigma as `focal` and `center`, where there are any."""
+def sigmas_of(entries: Entries) -> dict[str, Any]:
+    """The values of focal_sigma and center_sigma, where there are any."""
     found = {}
     for name in SIGMAS:
-        number = entries.number((f"{name}_sigma",))
+        number = entries.number((name,))
         if number is None:
             continue
         if not 0 <= number.value <= 0.5:

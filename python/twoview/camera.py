@@ -5,19 +5,30 @@ from __future__ import annotations
 
 import ctypes
 from dataclasses import dataclass
-from typing import Any, Optional, Sequence, overload
+from typing import Any, NamedTuple, Optional, Sequence, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _abi
-from .enums import CameraModel
+from .enums import CameraModel, Refine
 
 SHORTEST_FOCAL = 0.02  # of the image's side: 176 degrees of a pinhole; below it is another unit
 FARTHEST_CENTER = 1.0  # image sides that the principal point may lie outside the image
 # tools/twoview/files/camera_doubts.cc has the same numbers.
 NEAR_MIDDLE, FAR_FROM_MIDDLE = 0.05, 0.08  # of a principal point, as shares of the image's side
 SAME_FOCAL, OTHER_FOCAL = 0.05, 0.1  # differences of fx and fy as shares
+
+
+class Calibration(NamedTuple):
+    """tv_calibration: how uncertain the calibration of a camera is, and what of it may be refined.
+    Calibration() is that of an exact camera; read_calibration reads one from a file."""
+
+    focal_sigma: float = 0.0  #: relative standard deviation of the focal length, [0, 0.5]
+    #: Standard deviation of the principal point, in focal lengths: [0, 0.5], and at most 0.1 where
+    #: it may be refined.
+    center_sigma: float = 0.0
+    refine: int = Refine.NOTHING  #: a Refine
 
 
 @dataclass(frozen=True, eq=False, init=False)

@@ -15,15 +15,15 @@ import math
 import os
 import re
 import warnings
-from typing import Any, Callable, Mapping, NamedTuple, Optional, Sequence, Union
+from typing import Any, Callable, Mapping, Optional, Sequence, Union
 
 from ._camera_entries import (COEFFICIENTS, FISHEYE_COEFFICIENTS, NUM_MODELLED, Entries,
                               checked_camera, is_camera, number_of, plain, refuse, side_of,
                               sigmas_of, take_camera, word_of)
 from ._camera_entries import FormatError as FormatError
 from ._camera_entries import parse_number as parse_number
-from .camera import Camera, camera_check
-from .enums import CameraModel
+from .camera import Calibration, Camera, camera_check
+from .enums import CameraModel, Refine
 
 MAX_FILE_BYTES = 1 << 20
 PathLike = Union[str, "os.PathLike[str]"]
@@ -39,17 +39,10 @@ class CameraFileWarning(UserWarning):
     """Entries of a camera file that were left out, since they cannot concern the lens."""
 
 
-class CalibrationSigmas(NamedTuple):
-    """How sure a calibration is. The fields of EstimateOptions are focal_sigma0, center_sigma0 and
-    so on."""
-
-    focal: float  #: relative standard deviation of the focal length
-    center: float  #: standard deviation of the principal point, in focal lengths
-
-
 #: Of a camera file that does not say how sure it is, and of a focal length as for 35 mm film:
 #: those of the program (docs/decisions/0024-honest-covariance.md).
-PLAIN_FILE, FILM = CalibrationSigmas(0.01, 0.005), CalibrationSigmas(0.1, 0.01)
+PLAIN_FILE = Calibration(0.01, 0.005, Refine.FOCAL_LENGTH)
+FILM = Calibration(0.1, 0.01, Refine.FOCAL_LENGTH)
 
 
 # ---- text, YAML and XML --------------------------------------------------------------------------
@@ -243,7 +236,7 @@ class _Read:
 
     def __init__(self) -> None:
         self.cameras: dict[str, Camera] = {}
-        self.sigmas = PLAIN_FILE
+        self.calibration = PLAIN_FILE
         self.left_out: list[str] = []
 
     def add(self, name: str, values: Mapping[str, Any], where: str) -> None:
@@ -252,7 +245,7 @@ class _Read:
     def judge(self, root: Mapping[str, Any], where: str) -> None:
         """Judges the entries beside the cameras; how sure the calibration is may be among them."""
         rest = Entries(root, where)
-        self.sigmas = PLAIN_FILE._replace(**sigmas_of(rest))
+        self.calibration = PLAIN_FILE._replace(**sigmas_of(rest))
         refused, left_out = rest.judged()
         refuse(refused, where)
         self.left_out += left_out
@@ -486,7 +479,7 @@ def _read_file(text: str, name: str) -> _Read:
     if is_camera(root) and "fl_x" not in root and "model_type" not in root:
         _refuse_by_name(root, name)
         entries = Entries(root, name)
-        read.sigmas = PLAIN_FILE._replace(**sigmas_of(entries))
+        read.calibration = PLAIN_FILE._replace(**sigmas_of(entries))
         entry = root.get("camera_name")
         read.cameras[entry if isinstance(entry, str) else ""] = take_camera(entries, read.left_out)
         return read
@@ -563,15 +556,16 @@ def read_camera(path: PathLike, name: Optional[str] = None,
     return camera if scale_to is None else camera.scaled(*scale_to)
 
 
-def read_sigmas(path: PathLike) -> CalibrationSigmas:
-    """How sure the calibration in a camera file is: its entries focal_sigma (relative) and
+def read_calibration(path: PathLike) -> Calibration:
+    """How uncertain the calibration in a camera file is: its entries focal_sigma (relative) and
     center_sigma (in focal lengths), which `twoview calibrate` writes.
 
     path: of the file, in any format of read_cameras.
-    Returns CalibrationSigmas; those of PLAIN_FILE, 0.01 and 0.005, where the file does not say.
+    Returns a Calibration whose focal length may be refined; its deviations are those of PLAIN_FILE,
+    0.01 and 0.005, where the file does not say.
     Raises FormatError for a file that read_cameras refuses, and where one is not in [0, 0.5];
     OSError; ImportError without PyYAML."""
-    return _read_file(read_text(path), os.fspath(path)).sigmas
+    return _read_file(read_text(path), os.fspath(path)).calibration
 
 
 # ---- writing -------------------------------------------------------------------------------------
@@ -602,12 +596,12 @@ def _matrix_of(camera: Camera) -> list[float]:
     return [camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1]
 
 
-def _sigma_entries(sigmas: Optional[CalibrationSigmas]) -> list[tuple[str, str]]:
-    return [] if sigmas is None else [("focal_sigma", _digits(sigmas[0])),
-                                      ("center_sigma", _digits(sigmas[1]))]
+def _sigma_entries(calibration: Optional[Calibration]) -> list[tuple[str, str]]:
+    return [] if calibration is None else [("focal_sigma", _digits(calibration.focal_sigma)),
+                                           ("center_sigma", _digits(calibration.center_sigma))]
 
 
-def _opencv(name: str, camera: Camera, sigmas: Optional[CalibrationSigmas]) -> str:
+def _opencv(name: str, camera: Camera, calibration: Optional[Calibration]) -> str:
     def matrix(entry: str, rows: int, values: list[float]) -> str:
         return (f"{entry}: !!opencv-matrix\n   rows: {rows}\n   cols: {len(values) // rows}\n"
                 f"   dt: d\n   data: [ {', '.join(map(_digits, values))} ]\n")
@@ -616,10 +610,10 @@ def _opencv(name: str, camera: Camera, sigmas: Optional[CalibrationSigmas]) -> s
             + matrix("camera_matrix", 3, _matrix_of(camera))
             + ("distortion_model: equidistant\n" if _is_fisheye(camera) else "")
             + matrix("distortion_coefficients", 1, _coefficients(camera))
-            + "".join(f"{entry}: {value}\n" for entry, value in _sigma_entries(sigmas)))
+            + "".join(f"{entry}: {value}\n" for entry, value in _sigma_entries(calibration)))
 
 
-def _opencv_xml(name: str, camera: Camera, sigmas: Optional[CalibrationSigmas]) -> str:
+def _opencv_xml(name: str, camera: Camera, calibration: Optional[Calibration]) -> str:
     def matrix(entry: str, rows: int, values: list[float]) -> str:
         return (f'<{entry} type_id="opencv-matrix">\n  <rows>{rows}</rows>\n'
                 f"  <cols>{len(values) // rows}</cols>\n  <dt>d</dt>\n"
@@ -630,11 +624,12 @@ def _opencv_xml(name: str, camera: Camera, sigmas: Optional[CalibrationSigmas]) 
             + matrix("camera_matrix", 3, _matrix_of(camera))
             + ("<distortion_model>equidistant</distortion_model>\n" if _is_fisheye(camera) else "")
             + matrix("distortion_coefficients", 1, _coefficients(camera))
-            + "".join(f"<{entry}>{value}</{entry}>\n" for entry, value in _sigma_entries(sigmas))
+            + "".join(f"<{entry}>{value}</{entry}>\n"
+                      for entry, value in _sigma_entries(calibration))
             + "</opencv_storage>\n")
 
 
-def _ros(name: str, camera: Camera, sigmas: Optional[CalibrationSigmas]) -> str:
+def _ros(name: str, camera: Camera, calibration: Optional[Calibration]) -> str:
     def matrix(entry: str, rows: int, values: list[float]) -> str:
         return (f"{entry}:\n  rows: {rows}\n  cols: {len(values) // rows}\n"
                 f"  data: [{', '.join(map(_digits, values))}]\n")
@@ -647,7 +642,7 @@ def _ros(name: str, camera: Camera, sigmas: Optional[CalibrationSigmas]) -> str:
             + f"distortion_model: {lens}\n" + matrix("distortion_coefficients", 1, k)
             + matrix("rectification_matrix", 3, [1, 0, 0, 0, 1, 0, 0, 0, 1])
             + matrix("projection_matrix", 3, projection)
-            + "".join(f"{entry}: {value}\n" for entry, value in _sigma_entries(sigmas)))
+            + "".join(f"{entry}: {value}\n" for entry, value in _sigma_entries(calibration)))
 
 
 def _quoted(name: str) -> str:
@@ -657,7 +652,7 @@ def _quoted(name: str) -> str:
     return '"' + name.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
-def _kalibr(name: str, camera: Camera, sigmas: Optional[CalibrationSigmas]) -> str:
+def _kalibr(name: str, camera: Camera, calibration: Optional[Calibration]) -> str:
     k = _padded(camera)
     if any(k[4:]):
         raise ValueError(f"{name}: Kalibr's radtan has k1 k2 p1 p2, but k[{4 + _first(k[4:])}] of "
@@ -675,7 +670,7 @@ def _first(values: list[float]) -> int:
     return next(i for i, value in enumerate(values) if value)
 
 
-def _camera_set(name: str, camera: Camera, sigmas: Optional[CalibrationSigmas]) -> str:
+def _camera_set(name: str, camera: Camera, calibration: Optional[Calibration]) -> str:
     k = _padded(camera)
     num = 4 if _is_fisheye(camera) else 8 if any(k[5:]) else 5
     names = (FISHEYE_COEFFICIENTS if _is_fisheye(camera) else COEFFICIENTS)[:num]
@@ -686,7 +681,7 @@ def _camera_set(name: str, camera: Camera, sigmas: Optional[CalibrationSigmas]) 
             + "".join(f"  {entry}: {_digits(value)}\n" for entry, value in entries))
 
 
-def _colmap(name: str, camera: Camera, sigmas: Optional[CalibrationSigmas]) -> str:
+def _colmap(name: str, camera: Camera, calibration: Optional[Calibration]) -> str:
     k = _padded(camera)
     model, k = (("PINHOLE", []) if camera.model == CameraModel.PINHOLE else
                 ("OPENCV_FISHEYE", k[:4]) if _is_fisheye(camera) else
@@ -696,8 +691,8 @@ def _colmap(name: str, camera: Camera, sigmas: Optional[CalibrationSigmas]) -> s
     return f"{name} {model} {camera.width} {camera.height} {' '.join(map(_digits, values))}\n"
 
 
-_Writer = Callable[[str, Camera, Optional[CalibrationSigmas]], str]
-# {format: (its writer, whether a file holds several cameras, whether it holds sigmas)}
+_Writer = Callable[[str, Camera, Optional[Calibration]], str]
+# {format: (its writer, whether a file holds several cameras, whether it holds deviations)}
 _WRITERS: dict[str, tuple[_Writer, bool, bool]] = {
     "opencv": (_opencv, False, True), "opencv-xml": (_opencv_xml, False, True),
     "ros": (_ros, False, True), "kalibr": (_kalibr, True, False),
@@ -706,23 +701,23 @@ FORMATS = tuple(_WRITERS)
 
 
 def format_cameras(cameras: Union[Camera, Mapping[str, Camera]], format: str = "opencv",
-                   sigmas: Optional[CalibrationSigmas] = None) -> str:
+                   calibration: Optional[Calibration] = None) -> str:
     """The text of a camera file. Reading it gives the same cameras, bit for bit (COLMAP's cx and cy
     to the last bit or two).
 
     cameras: a Camera, or {name: Camera} for a format with names; COLMAP's names are numbers, others
     are replaced by 1, 2 and so on. format: "opencv" (YAML), "opencv-xml", "ros" (camera_info),
-    "kalibr" (camchain), "cameras.yaml" or "colmap" (cameras.txt). sigmas: None, or how sure the
-    calibration is, which "opencv", "opencv-xml" and "ros" have entries for.
+    "kalibr" (camchain), "cameras.yaml" or "colmap" (cameras.txt). calibration: None, or its
+    standard deviations, which "opencv", "opencv-xml" and "ros" have entries for.
     Returns the text.
-    Raises ValueError for another format, for a lens or sigmas that the format does not have, for
-    several cameras in a format of one, and for numbers that read_cameras refuses; TV_ERR_CAMERA for
-    a camera that the library refuses."""
+    Raises ValueError for another format, for a lens or a calibration that the format does not have,
+    for several cameras in a format of one, and for numbers that read_cameras refuses; TV_ERR_CAMERA
+    for a camera that the library refuses."""
     if format not in _WRITERS:
         raise ValueError(f"format '{format}' is not one of {', '.join(FORMATS)}")
-    write, has_names, has_sigmas = _WRITERS[format]
-    if sigmas is not None and not has_sigmas:
-        raise ValueError(f"sigmas: the format {format} has no entry for them")
+    write, has_names, has_deviations = _WRITERS[format]
+    if calibration is not None and not has_deviations:
+        raise ValueError(f"calibration: the format {format} has no entry for it")
     named = {"cam0": cameras} if isinstance(cameras, Camera) else dict(cameras)
     if not named or (len(named) > 1 and not has_names):
         raise ValueError(f"{len(named)} cameras: a file of the format {format} holds "
@@ -734,17 +729,19 @@ def format_cameras(cameras: Union[Camera, Mapping[str, Camera]], format: str = "
     if format == "colmap" and not all(re.fullmatch("[0-9]+", name) for name in named):
         named = {str(number): camera for number, camera in enumerate(named.values(), 1)}
     head = "# CAMERA_ID MODEL WIDTH HEIGHT PARAMETERS\n" if format == "colmap" else ""
-    return head + "".join(write(name, camera, sigmas) for name, camera in named.items())
+    return head + "".join(write(name, camera, calibration) for name, camera in named.items())
 
 
 def write_cameras(path: PathLike, cameras: Union[Camera, Mapping[str, Camera]],
-                  format: str = "opencv", sigmas: Optional[CalibrationSigmas] = None) -> None:
+                  format: str = "opencv", calibration: Optional[Calibration] = None) -> None:
     """Writes a camera file, under a temporary name first, so that none stays half written.
 
-    path: of the file; an existing one is replaced. cameras, format, sigmas: as for format_cameras.
+    path: of the file; an existing one is replaced. cameras, format, calibration: as for
+    format_cameras.
     Returns None.
     Raises as format_cameras does, before anything is written, and OSError."""
-    text, temporary = format_cameras(cameras, format, sigmas), f"{os.fspath(path)}.{os.getpid()}"
+    text = format_cameras(cameras, format, calibration)
+    temporary = f"{os.fspath(path)}.{os.getpid()}"
     file = open(temporary, "x", encoding="utf-8")
     try:
         with file:

@@ -71,6 +71,14 @@ class CameraModel(IntEnum):
     KANNALA_BRANDT = 2
 
 
+class Refine(IntFlag):
+    """tv_refine: what of a given camera may be refined."""
+
+    NOTHING = 0
+    FOCAL_LENGTH = 1 << 0
+    PRINCIPAL_POINT = 1 << 1
+
+
 class Solver(IntEnum):
     AUTO = 0
     FIVE_POINT = 1
@@ -172,7 +180,8 @@ class RoomPlaneKind(IntEnum):
 C_PREFIXES = {
     Status: "TV_", Kernels: "TV_KERNELS_", Stage: "TV_STAGE_", Purpose: "TV_PURPOSE_",
     Orientation: "TV_ORIENTATION_", Normalisation: "TV_NORMALISATION_",
-    CameraModel: "TV_CAMERA_", Solver: "TV_SOLVER_", Kind: "TV_KIND_", Verdict: "TV_VERDICT_",
+    CameraModel: "TV_CAMERA_", Refine: "TV_REFINE_", Solver: "TV_SOLVER_", Kind: "TV_KIND_",
+    Verdict: "TV_VERDICT_",
     Reason: "TV_REASON_",
     Triangulation: "TV_TRIANGULATION_", PointStatus: "TV_POINT_", Loss: "TV_LOSS_",
     OdometryStatus: "TV_ODOMETRY_", ScaleSource: "TV_SCALE_",

@@ -9,7 +9,8 @@ from typing import Any, Optional, Sequence
 import numpy as np
 
 from . import _abi
-from .enums import Kernels, Loss, Normalisation, Orientation, Solver
+from .camera import Calibration
+from .enums import Kernels, Loss, Normalisation, Orientation, Refine, Solver
 
 
 class _Options:
@@ -75,14 +76,11 @@ class EstimateOptions(_Options):
     gravity0: Sequence[float] = (0.0, 0.0, 0.0)  #: direction of gravity in camera 0's frame
     gravity1: Sequence[float] = (0.0, 0.0, 0.0)  #: and in camera 1's; of any length
     gravity_sigma_rad: float = 0.0  #: standard deviation of gravity; 0: it is not used
-    #: Standard deviation in focal lengths; 0: the principal point is exact and never moved.
-    principal_point_sigma: float = 0.0
-    #: Relative standard deviations of the two cameras' focal lengths; 0: exact. Above 0.02, where
-    #: both cameras are equal, the focal length is refined with the pose (TwoView.focal_scale).
-    focal_sigma0: float = 0.0
-    focal_sigma1: float = 0.0  #: of camera 1
-    center_sigma0: float = 0.0  #: of the principal points, in focal lengths; 0: exact
-    center_sigma1: float = 0.0  #: of camera 1
+    #: How uncertain camera 0 is. Where both cameras are equal, the larger deviations of both count,
+    #: and what either allows may be refined: with a focal_sigma above 0.02 the focal length
+    #: (TwoView.focal_scale), else the principal point (TwoView.principal_point_shift).
+    calibration0: Calibration = Calibration()
+    calibration1: Calibration = Calibration()  #: of camera 1
     #: Standard deviation of a camera's turn while a picture's rows are read, about each axis,
     #: radians; 0: all rows are exposed at once, and no rolling shutter is tested.
     readout_turn_sigma_rad: float = 0.02
@@ -134,7 +132,8 @@ class OdometryOptions:
     window: int = 10  #: keyframes that are adjusted together, [3, 20]
     kernels: int = Kernels.AUTO
     seed: Optional[int] = None  #: seed of every sampler; None: the library's constant
-    correct_camera: bool = True  #: move the principal point where many keyframes agree
+    #: A Refine: PRINCIPAL_POINT moves it where many keyframes agree, NOTHING keeps the camera.
+    refine: int = Refine.PRINCIPAL_POINT
 
 
 @dataclass(frozen=True)

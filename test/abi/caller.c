@@ -138,7 +138,7 @@ static void init_all(void) {
   }
   CHECK(limits.it.max_width == 640 && match.it.ratio == 0.92f);
   CHECK(bundle.it.loss == TV_LOSS_CAUCHY && bundle.it.max_iterations == 50);
-  CHECK(estimate.it.confidence == 0.9999 && estimate.it.principal_point_sigma == 0);
+  CHECK(estimate.it.confidence == 0.9999 && estimate.it.calibration0.refine == 0);
 }
 
 static tv_context *make_context(void) {

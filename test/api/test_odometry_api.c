@@ -96,7 +96,7 @@ static void test_init_functions_write_defaults_and_sizes(void) {
   TEST_ASSERT_EQUAL_INT(20000, options.max_points);
   TEST_ASSERT_EQUAL_INT(10, options.window);
   TEST_ASSERT_EQUAL_INT(TV_KERNELS_AUTO, options.kernels);
-  TEST_ASSERT_EQUAL_INT(1, options.correct_camera);
+  TEST_ASSERT_EQUAL_UINT32(TV_REFINE_PRINCIPAL_POINT, options.refine);
   memset(&frame, 1, sizeof frame);
   tv_odometry_frame_init(&frame);
   TEST_ASSERT_EQUAL_UINT32(sizeof frame, frame.struct_size);
@@ -136,14 +136,17 @@ static void expect_size(tv_status expected) {
 
 static void test_size_refuses_bad_cameras_and_options(void) {
   const tv_odometry_options good = options;
-  static const int32_t ranges[7][2] = {
-      {100, 4096}, {8, 2000}, {500, 200000}, {3, 20}, {TV_KERNELS_AUTO, TV_KERNELS_NEON},
-      {0, 1},      {0, 0}};
+  static const int32_t ranges[6][2] = {
+      {100, 4096}, {8, 2000}, {500, 200000}, {3, 20}, {TV_KERNELS_AUTO, TV_KERNELS_NEON}, {0, 0}};
+  /* The focal length of a flight is not refined, and there is nothing else to refine. */
+  static const uint32_t masks[] = {
+      TV_REFINE_FOCAL_LENGTH, TV_REFINE_FOCAL_LENGTH | TV_REFINE_PRINCIPAL_POINT, 4, UINT32_MAX};
   int k;
-  for (k = 0; k < 7; ++k) {
-    int32_t *const fields[7] = {
-        &options.max_keypoints, &options.max_keyframes,  &options.max_points, &options.window,
-        &options.kernels,       &options.correct_camera, &options.reserved};
+  for (k = 0; k < 4; ++k) options.refine = masks[k], expect_size(TV_ERR_ARGUMENT);
+  options = good;
+  for (k = 0; k < 6; ++k) {
+    int32_t *const fields[6] = {&options.max_keypoints, &options.max_keyframes, &options.max_points,
+                                &options.window,        &options.kernels,       &options.reserved};
     *fields[k] = ranges[k][0] - 1, expect_size(TV_ERR_ARGUMENT);
     *fields[k] = ranges[k][1] + 1, expect_size(TV_ERR_ARGUMENT);
     options = good;

@@ -270,6 +270,7 @@ static void expect_options_refused(tv_status expected) {
 
 static void test_init_sets_the_documented_defaults(void) {
   tv_two_view zero;
+  tv_calibration exact;
   memset(&options, API_PATTERN, sizeof options);
   tv_estimate_options_init(&options);
   TEST_ASSERT_EQUAL_UINT32(sizeof options, options.struct_size);
@@ -277,6 +278,9 @@ static void test_init_sets_the_documented_defaults(void) {
   TEST_ASSERT_TRUE(options.max_error_px == 1.0 && options.confidence == 0.9999);
   TEST_ASSERT_EQUAL_INT(10000, options.max_iterations);
   TEST_ASSERT_EQUAL_INT(0, options.fixed_iterations);
+  memset(&exact, 0, sizeof exact);
+  TEST_ASSERT_EQUAL_MEMORY(&exact, &options.calibration0, sizeof exact);
+  TEST_ASSERT_EQUAL_MEMORY(&exact, &options.calibration1, sizeof exact);
   memset(&result, API_PATTERN, sizeof result);
   tv_two_view_init(&result);
   TEST_ASSERT_EQUAL_UINT32(sizeof result, result.struct_size);
@@ -348,6 +352,48 @@ static void test_options_out_of_range_are_refused(void) {
   options.fixed_iterations = -1, expect_options_refused(TV_ERR_ARGUMENT);
   options.fixed_iterations = 1000001, expect_options_refused(TV_ERR_ARGUMENT);
   options.confidence = 0, options.max_iterations = 1, estimate(100);
+}
+
+/* Of either camera, and whether or not the cameras are equal. */
+static void test_calibrations_out_of_range_are_refused(void) {
+  static const double low[3] = {NAN, INFINITY, -INFINITY}, outside[2] = {-1e-9, 0.5000001};
+  int which, k;
+  for (which = 0; which < 2; ++which) {
+    tv_calibration *const c = which == 0 ? &options.calibration0 : &options.calibration1;
+    tv_calibration *const other = which == 0 ? &options.calibration1 : &options.calibration0;
+    for (k = 0; k < 3; ++k) {
+      c->focal_sigma = low[k], expect_options_refused(TV_ERR_NOT_FINITE);
+      c->center_sigma = low[k], expect_options_refused(TV_ERR_NOT_FINITE);
+    }
+    for (k = 0; k < 2; ++k) {
+      c->focal_sigma = outside[k], expect_options_refused(TV_ERR_ARGUMENT);
+      c->center_sigma = outside[k], expect_options_refused(TV_ERR_ARGUMENT);
+    }
+    c->refine = 4, expect_options_refused(TV_ERR_ARGUMENT);
+    c->refine = 1u << 31 | TV_REFINE_FOCAL_LENGTH, expect_options_refused(TV_ERR_ARGUMENT);
+    c->reserved = 1, expect_options_refused(TV_ERR_ARGUMENT);
+    /* Where one camera's principal point may be refined, both deviations are at most 0.1. */
+    c->refine = TV_REFINE_PRINCIPAL_POINT;
+    c->center_sigma = 0.1000001, expect_options_refused(TV_ERR_ARGUMENT);
+    c->refine = TV_REFINE_PRINCIPAL_POINT;
+    other->center_sigma = 0.1000001, expect_options_refused(TV_ERR_ARGUMENT);
+    c->refine = TV_REFINE_FOCAL_LENGTH | TV_REFINE_PRINCIPAL_POINT;
+    c->center_sigma = 0.1, c->focal_sigma = 0.5, estimate(100);
+    tv_estimate_options_init(&options);
+    c->center_sigma = 0.5, c->refine = TV_REFINE_FOCAL_LENGTH, estimate(100);
+    tv_estimate_options_init(&options);
+  }
+}
+
+/* What has a deviation of 0 is exact, whatever the mask allows. */
+static void test_a_mask_without_deviations_changes_nothing(void) {
+  tv_two_view exact;
+  camera1 = camera0;
+  estimate(300);
+  exact = result;
+  options.calibration0.refine = TV_REFINE_FOCAL_LENGTH | TV_REFINE_PRINCIPAL_POINT;
+  estimate(300);
+  TEST_ASSERT_EQUAL_MEMORY(&exact, &result, sizeof result);
 }
 
 static void test_more_or_fewer_matches_than_there_can_be_are_refused(void) {
@@ -764,6 +810,8 @@ int main(void) {
   RUN_TEST(test_null_is_fine_where_the_header_says_so);
   RUN_TEST(test_wrong_struct_sizes_are_refused);
   RUN_TEST(test_options_out_of_range_are_refused);
+  RUN_TEST(test_calibrations_out_of_range_are_refused);
+  RUN_TEST(test_a_mask_without_deviations_changes_nothing);
   RUN_TEST(test_more_or_fewer_matches_than_there_can_be_are_refused);
   RUN_TEST(test_cameras_are_checked);
   RUN_TEST(test_the_mask_may_not_lie_over_an_input);

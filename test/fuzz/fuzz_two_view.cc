@@ -20,12 +20,12 @@ tv_estimate_options options_of(fuzz::Bytes& bytes) {
     for (double& g : options.gravity0) g = bytes.wild(-1, 1);
     for (double& g : options.gravity1) g = bytes.wild(-1, 1);
   }
-  if (bytes.whole(0, 3) == 0) options.principal_point_sigma = bytes.wild(0, 0.1);
   if (bytes.whole(0, 3) == 0) {
-    options.focal_sigma0 = bytes.wild(0, 0.5);
-    options.focal_sigma1 = bytes.wild(0, 0.5);
-    options.center_sigma0 = bytes.wild(0, 0.5);
-    options.center_sigma1 = bytes.wild(0, 0.5);
+    for (tv_calibration* c : {&options.calibration0, &options.calibration1}) {
+      c->refine = static_cast<uint32_t>(bytes.whole(0, 4));
+      c->focal_sigma = bytes.wild(0, 0.5);
+      c->center_sigma = bytes.wild(0, bytes.whole(0, 1) == 0 ? 0.1 : 0.5);
+    }
     options.readout_turn_sigma_rad = bytes.wild(0, 0.5);
   }
   return options;

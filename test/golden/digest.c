@@ -30,7 +30,8 @@ LAYOUT(tv_correspondence, 16, ratio, 12);
 LAYOUT(tv_match_options, 16, max_distance, 12);
 LAYOUT(tv_guided_options, 20, neighbourhood_px, 16);
 LAYOUT(tv_camera, 112, k, 48);
-LAYOUT(tv_estimate_options, 152, reserved, 148);
+LAYOUT(tv_calibration, 24, reserved, 20);
+LAYOUT(tv_estimate_options, 160, reserved, 156);
 LAYOUT(tv_two_view, 920, focal_sigma, 912);
 LAYOUT(tv_evidence, 120, camera_direction_rad, 112);
 LAYOUT(tv_point, 40, reserved, 36);
@@ -341,7 +342,8 @@ static void digest_principal_point(const pair *p, tv_context *context) {
   uint64_t seed = 1;
   int lens, k, v;
   tv_estimate_options_init(&options);
-  options.principal_point_sigma = 0.01;
+  options.calibration0.center_sigma = 0.01;
+  options.calibration0.refine = TV_REFINE_PRINCIPAL_POINT;
   start();
   for (lens = 0; lens < 2; ++lens) {
     camera.model = lens ? TV_CAMERA_BROWN_CONRADY : TV_CAMERA_PINHOLE;

@@ -65,7 +65,7 @@ EstimatedPair estimated(const tv_camera& camera, bool swapped = false, double si
   tv_estimate_options options;
   tv_estimate_options_init(&options);
   if (sigma >= 0) options.readout_turn_sigma_rad = sigma;
-  options.focal_sigma0 = options.focal_sigma1 = focal_sigma;
+  options.calibration0 = {focal_sigma, 0, TV_REFINE_FOCAL_LENGTH, 0};
   EstimatedPair result;
   tv_two_view_init_sized(&result, sizeof(tv_two_view));
   const int a = swapped ? 1 : 0;

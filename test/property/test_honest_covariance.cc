@@ -53,6 +53,8 @@ void draw(uint64_t number, double noise_px, int num, bool plane) {
   }
 }
 
+constexpr uint32_t kRefineAll = TV_REFINE_FOCAL_LENGTH | TV_REFINE_PRINCIPAL_POINT;
+
 tv_two_view estimate(const tv_camera& camera0, const tv_camera& camera1,
                      const tv_estimate_options& options) {
   tv_two_view r;
@@ -161,9 +163,9 @@ void check_slopes(bool plane, bool one_camera, int parameter) {
     tv_estimate_options options = defaults();
     const tv_two_view without = estimate(cameras[0], cameras[1], options);
     if (parameter == 0) {
-      options.focal_sigma0 = kSigma;
+      options.calibration0.focal_sigma = kSigma;
     } else {
-      options.center_sigma0 = kSigma;
+      options.calibration0.center_sigma = kSigma;
     }
     const tv_two_view with = estimate(cameras[0], cameras[1], options);
     if (without.has_covariance == 0 || without.has_alternative != 0) continue;
@@ -234,8 +236,7 @@ void test_an_uncertain_focal_length_is_refined_and_its_error_covered(void) {
     camera.fy *= std::exp(off);
     tv_estimate_options options = defaults();
     const tv_two_view exact = estimate(camera, camera, options);
-    options.focal_sigma0 = 0.1;
-    options.principal_point_sigma = 0.01;
+    options.calibration0 = {0.1, 0.01, kRefineAll, 0};
     const tv_two_view r = estimate(camera, camera, options);
     TEST_ASSERT_TRUE(r.principal_point_shift[0] == 0 && r.principal_point_shift[1] == 0);
     if (r.verdict != TV_VERDICT_OK || r.kind != TV_KIND_CALIBRATED) continue;
@@ -279,7 +280,8 @@ void test_two_uncertain_focal_lengths_count_in_the_verdict(void) {
     other.width += 2;
     tv_estimate_options options = defaults();
     TEST_ASSERT_EQUAL_INT(TV_VERDICT_OK, estimate(pair.camera[0], other, options).verdict);
-    options.focal_sigma0 = options.focal_sigma1 = k < 12 ? 0.1 : 0.021;
+    options.calibration0 = {k < 12 ? 0.1 : 0.021, 0, kRefineAll, 0};
+    options.calibration1 = options.calibration0;
     const tv_two_view r = estimate(pair.camera[0], other, options);
     TEST_ASSERT_TRUE(r.focal_scale == 0 && r.has_covariance != 0);
     const double* const c = r.covariance;
@@ -297,13 +299,12 @@ void test_exchanged_views_have_the_same_focal_length(void) {
   for (int k = 0; k < 12; ++k) {
     draw(7000 + static_cast<uint64_t>(k), 0.3, 150, false);
     tv_estimate_options options = defaults();
-    options.focal_sigma0 = 0.08;
-    options.center_sigma1 = 0.004;
+    options.calibration0.focal_sigma = 0.08;
+    options.calibration1 = {0, 0.004, TV_REFINE_FOCAL_LENGTH, 0};
     const tv_two_view forward = estimate(pair.camera[0], pair.camera[0], options);
     tv_two_view back;
     tv_two_view_init(&back);
-    std::swap(options.focal_sigma0, options.focal_sigma1);
-    std::swap(options.center_sigma0, options.center_sigma1);
+    std::swap(options.calibration0, options.calibration1);
     TEST_ASSERT_EQUAL_INT(
         TV_OK, estimate_pixels(context, &pair.camera[0], &pair.camera[0], pair.pixels[1],
                                pair.pixels[0], nullptr, pair.num, &options, &back, nullptr));
@@ -314,23 +315,50 @@ void test_exchanged_views_have_the_same_focal_length(void) {
   }
 }
 
-void test_sigmas_out_of_range_are_refused(void) {
-  draw(1, 0.3, 100, false);
-  double tv_estimate_options::*const fields[] = {
-      &tv_estimate_options::focal_sigma0, &tv_estimate_options::focal_sigma1,
-      &tv_estimate_options::center_sigma0, &tv_estimate_options::center_sigma1};
-  for (const auto field : fields) {
-    for (const double value : {-0.001, 0.51, std::nan("")}) {
-      tv_estimate_options options = defaults();
-      options.*field = value;
-      tv_two_view r;
-      tv_two_view_init(&r);
-      const tv_status status =
-          estimate_pixels(context, &pair.camera[0], &pair.camera[1], pair.pixels[0], pair.pixels[1],
-                          nullptr, pair.num, &options, &r, nullptr);
-      TEST_ASSERT_EQUAL_INT(value == value ? TV_ERR_ARGUMENT : TV_ERR_NOT_FINITE, status);
+// Without the bit of the focal length nothing of the camera is refined: the pose is that of an
+// exact camera, and its covariance and verdict contain how uncertain the focal length is.
+void test_what_may_not_be_refined_stays_and_counts(void) {
+  int doubtful = 0;
+  for (int k = 0; k < 12; ++k) {
+    draw(5000 + static_cast<uint64_t>(k), 0.3, 200, false);
+    tv_estimate_options options = defaults();
+    const tv_two_view exact = estimate(pair.camera[0], pair.camera[0], options);
+    options.calibration1 = {0.1, 0.01, TV_REFINE_PRINCIPAL_POINT, 0};
+    const tv_two_view r = estimate(pair.camera[0], pair.camera[0], options);
+    TEST_ASSERT_TRUE(r.focal_scale == 0 && r.focal_sigma == 0.1);
+    TEST_ASSERT_TRUE(r.principal_point_shift[0] == 0 && r.principal_point_shift[1] == 0);
+    TEST_ASSERT_EQUAL_MEMORY(exact.R, r.R, sizeof r.R);
+    TEST_ASSERT_EQUAL_MEMORY(exact.t, r.t, sizeof r.t);
+    for (int i = 0; i < 25; i += 6) TEST_ASSERT_TRUE(r.covariance[i] > exact.covariance[i]);
+    doubtful += exact.verdict == TV_VERDICT_OK && r.verdict != TV_VERDICT_OK;
+  }
+  TEST_ASSERT_TRUE(doubtful > 0);
+}
+
+// The principal point's deviation counts once: as it is given where the point stays, else what the
+// matches leave of it, which is less.
+void test_the_principal_points_sigma_counts_once(void) {
+  int stayed = 0, moved = 0;
+  for (int k = 0; k < 24; ++k) {
+    draw(7300 + static_cast<uint64_t>(k), 0.2, 250, false);
+    tv_camera camera = pair.camera[0];
+    if (k % 2 == 1) camera.cx += 0.03 * camera.fx;
+    tv_estimate_options options = defaults();
+    options.calibration0.center_sigma = 0.01;
+    const tv_two_view kept = estimate(camera, camera, options);
+    options.calibration0.refine = TV_REFINE_PRINCIPAL_POINT;
+    const tv_two_view r = estimate(camera, camera, options);
+    if (kept.has_covariance == 0 || r.has_covariance == 0) continue;
+    if (r.principal_point_shift[0] == 0 && r.principal_point_shift[1] == 0) {
+      TEST_ASSERT_EQUAL_MEMORY(&kept, &r, sizeof r);
+      ++stayed;
+    } else {
+      TEST_ASSERT_TRUE(covariance_of(r).trace() < covariance_of(kept).trace());
+      ++moved;
     }
   }
+  std::printf("principal point: %d stayed, %d moved\n", stayed, moved);
+  TEST_ASSERT_TRUE(stayed >= 4 && moved >= 4);
 }
 
 }  // namespace
@@ -349,6 +377,7 @@ int main(void) {
   RUN_TEST(test_an_uncertain_focal_length_is_refined_and_its_error_covered);
   RUN_TEST(test_two_uncertain_focal_lengths_count_in_the_verdict);
   RUN_TEST(test_exchanged_views_have_the_same_focal_length);
-  RUN_TEST(test_sigmas_out_of_range_are_refused);
+  RUN_TEST(test_what_may_not_be_refined_stays_and_counts);
+  RUN_TEST(test_the_principal_points_sigma_counts_once);
   return UNITY_END();
 }

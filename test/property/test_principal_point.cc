@@ -45,7 +45,7 @@ tv_status estimate(const tv_camera& camera0, const tv_camera& camera1, double si
                    EstimatedPair* result) {
   tv_estimate_options options;
   tv_estimate_options_init(&options);
-  options.principal_point_sigma = sigma;
+  options.calibration0 = {0, sigma, TV_REFINE_PRINCIPAL_POINT, 0};
   tv_two_view_init_sized(result, sizeof(tv_two_view));
   const int a = swapped ? 1 : 0;
   return estimate_evidence(api.context, swapped ? &camera1 : &camera0,

@@ -60,8 +60,8 @@ class TestConventions(unittest.TestCase):
 
 
 class TestShift(unittest.TestCase):
-    """With principal_point_sigma our poses may belong to a camera with a shifted principal point;
-    then lines, residuals and points belong to that camera too."""
+    """With TV_REFINE_PRINCIPAL_POINT our poses may belong to a camera with a shifted principal
+    point; then lines, residuals and points belong to that camera too."""
 
     @classmethod
     def setUpClass(cls):
@@ -88,7 +88,7 @@ class TestShift(unittest.TestCase):
         cls.given = {"pixels0": pixels[0].tolist(), "pixels1": pixels[1].tolist(), "ratios": None,
                      "cameras": [told, told], "sizes": [[640, 480], [640, 480]]}
         cls.task = {"max_error_px": 1.0, "seed": 0, "reference": None,
-                    "options": {"principal_point_sigma": 0.01}}
+                    "options": {"calibration0.center_sigma": 0.01, "calibration0.refine": 2}}
 
     def answer(self):
         from twoview_tools.compare import children, cli, systems

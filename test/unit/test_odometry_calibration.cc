@@ -179,10 +179,12 @@ tv_camera wrong_camera() {
   return camera;
 }
 
-tv_odometry* begin_flight_of(const tv_camera& camera, int32_t correct_camera, uint8_t* where) {
+constexpr uint32_t kRefine[2] = {TV_REFINE_NOTHING, TV_REFINE_PRINCIPAL_POINT};
+
+tv_odometry* begin_flight_of(const tv_camera& camera, uint32_t refine, uint8_t* where) {
   tv_odometry_options options;
   tv_odometry_options_init(&options);
-  options.correct_camera = correct_camera;
+  options.refine = refine;
   tv_odometry* made = nullptr;
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_init(&made, &camera, &options, where, sizeof memory));
   return made;
@@ -232,7 +234,7 @@ void expect_map_keeps_camera() {
   const tv_camera given = wrong_camera(), used = odometry->camera.model;
   tv_camera loaded;
   const size_t num = save(odometry, map);
-  tv_odometry* second = begin_flight_of(given, 1, other_memory);
+  tv_odometry* second = begin_flight_of(given, TV_REFINE_PRINCIPAL_POINT, other_memory);
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_load(second, map, num));
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_camera(second, &loaded));
   TEST_ASSERT_EQUAL_MEMORY(&used, &loaded, sizeof used);
@@ -282,7 +284,7 @@ void test_the_map_is_adjusted_to_the_corrected_camera() {
   double spread[2];
   for (const int corrects : {0, 1}) {
     tv_odometry_state state;
-    odometry = begin_flight_of(wrong_camera(), corrects, memory);
+    odometry = begin_flight_of(wrong_camera(), kRefine[corrects], memory);
     for (int n = 0; n < 150; ++n) {
       fly(odometry, n, &state);
       TEST_ASSERT_TRUE(n < 30 || state.has_pose);
@@ -308,7 +310,7 @@ void test_pairs_that_check_the_map_are_evidence() {
   static tv_correspondence matches[kNum];
   for (const int corrects : {0, 1}) {
     tv_camera given = room_camera();
-    odometry = begin_flight_of(given, corrects, memory);
+    odometry = begin_flight_of(given, kRefine[corrects], memory);
     for (int pair = 0; pair < 6; ++pair) {
       const double angle = 0.3 + 0.05 * pair, c = std::cos(angle), s = std::sin(angle);
       const tv::Rigid motion = {{c, 0, -s, 0, 1, 0, s, 0, c}, {-0.4, 0.02, 0.05}};

@@ -45,6 +45,34 @@ typedef struct tv_camera {
   double k[8];
 } tv_camera;
 
+/* What of a given camera may be refined: bits of a mask. A bit is a permission. A camera is changed
+   only where the matches are evidence enough against it, by the rule of the call that takes the
+   mask, and the result says by how much. */
+typedef enum tv_refine {
+  /* The camera stays as it was given. */
+  TV_REFINE_NOTHING = 0,
+  /* fx and fy, by one factor. */
+  TV_REFINE_FOCAL_LENGTH = 1 << 0,
+  /* cx and cy. */
+  TV_REFINE_PRINCIPAL_POINT = 1 << 1
+} tv_refine;
+
+/* How uncertain the calibration of a camera is, and what of it may be refined. Zeros: the camera is
+   exact. The covariance of a pose contains what these standard deviations make of the pose, to
+   first order; of what was refined, it contains what the matches leave. */
+typedef struct tv_calibration {
+  /* The standard deviation of fx and fy, one factor for both, relative to them, [0, 0.5]. 0.005
+     suits a calibration of unknown quality, 0.1 a focal length from a data sheet. */
+  double focal_sigma;
+  /* The standard deviation of cx and of cy, in focal lengths, [0, 0.5]; at most 0.1 where the
+     principal point may be refined. 0.005 suits a calibration of unknown quality. */
+  double center_sigma;
+  /* TV_REFINE_ bits. What has a standard deviation of 0 is exact, and is not refined. */
+  uint32_t refine;
+  /* Must be 0. */
+  uint32_t reserved;
+} tv_calibration;
+
 /* Two cameras and the motion between them: all that a point's two pixels depend on. It holds its
    values and points to nothing, so that it may be kept and copied. tv_corrected_pair makes it from
    the result of an estimate; with a known motion, the caller fills every field. */

@@ -109,10 +109,11 @@ typedef struct tv_odometry_options {
   /* The seed of every sampler. Its default is constant and never the time of day: equal frames give
      equal bytes. */
   uint64_t seed;
-  /* 1 (default): the camera's principal point is moved where many pairs of keyframes agree that it
-     lies elsewhere, by at most 5 per cent of the focal length; 0: the camera is kept as it was
-     given. */
-  int32_t correct_camera;
+  /* What of the camera may be refined, TV_REFINE_ bits. TV_REFINE_PRINCIPAL_POINT (default): the
+     principal point is moved where many pairs of keyframes agree that it lies elsewhere, by at most
+     5 per cent of the focal length; that needs no standard deviation. TV_REFINE_NOTHING: the camera
+     is kept as it was given. Any other bit is TV_ERR_ARGUMENT. */
+  uint32_t refine;
   /* Must be 0. */
   int32_t reserved;
 } tv_odometry_options;

@@ -171,23 +171,14 @@ typedef struct tv_estimate_options {
      [0, pi]; 0 (default) means that gravity is not known. With every solver, a pose is refined with
      gravity as a prior; a direction that contradicts the matches counts less. */
   double gravity_sigma_rad;
-  /* 0 (default): the cameras are exact. Above 0, at most 0.1: the standard deviation of the
-     principal point around (cx, cy), in focal lengths; 0.01 suits a camera whose calibration is
-     doubtful. Used only when camera0 and camera1 are equal. The principal point is moved only if
-     the matches contradict (cx, cy) at a significance of 0.001. */
-  double principal_point_sigma;
-  /* How sure the focal lengths of camera0 and camera1 are: the standard deviation of fx and fy, one
-     factor for both, relative to them, [0, 0.5]. 0 (default): they are exact. The covariance grows
-     by what such errors make of the pose, to first order. Where camera0 and camera1 are equal, they
-     are one camera with one error, of the larger sigma; then, above 0.02, the focal length is also
-     refined with the pose, with this deviation as a prior (focal_scale), and the principal point is
-     not moved. 0.005 suits a calibration of unknown quality, 0.1 a focal length from a data
-     sheet. */
-  double focal_sigma0, focal_sigma1;
-  /* How sure (cx, cy) of camera0 and of camera1 are: the standard deviation of each coordinate, in
-     focal lengths, [0, 0.5]. 0 (default): they are exact. The covariance grows as for the focal
-     length; unlike principal_point_sigma, nothing is moved. */
-  double center_sigma0, center_sigma1;
+  /* How uncertain the calibrations of camera0 and camera1 are; zeros (default): both are exact.
+     Where camera0 and camera1 are equal, they are one camera with one error: the larger standard
+     deviations count, and what either allows may be refined. Only such a camera is refined. Above
+     a focal_sigma of 0.02, that is its focal length, together with the pose and with focal_sigma as
+     a prior (focal_scale of the result); up to 0.02 it is its principal point, where the matches
+     contradict (cx, cy) at a significance of 0.001, with center_sigma as a prior
+     (principal_point_shift of the result). */
+  tv_calibration calibration0, calibration1;
   /* How far a camera may turn while the sensor reads the rows of a picture, one after another: the
      standard deviation about each axis, in radians, [0, 0.5]; default 0.02, which is 50 degrees a
      second in 23 ms. Where the matches contradict cameras that stood still
@@ -273,8 +264,8 @@ typedef struct tv_two_view {
   double noise_px;
   /* The seed that was used. */
   uint64_t seed;
-  /* What the estimate adds to (cx, cy) of both cameras, in pixels: (0, 0) unless
-     principal_point_sigma is above 0. All of the result refers to the cameras with it, which
+  /* What the estimate adds to (cx, cy) of both cameras, in pixels: (0, 0) unless the options allow
+     to refine the principal point. All of the result refers to the cameras with it, which
      tv_corrected_pair computes. */
   double principal_point_shift[2];
   /* The probability that the pose is wrong, [0, 1]. It is calibrated on real pairs for one event:
@@ -286,14 +277,14 @@ typedef struct tv_two_view {
      tv_evidence, with noise_px and has_alternative. */
   double probability_wrong;
   /* The factor, without a unit, by which the estimate multiplies fx and fy of both cameras, where
-     the focal length was refined with the pose (focal_sigma0): all of the result refers to the
-     cameras with it, which tv_corrected_pair computes. 0 where the focal length is as given. */
+     the focal length was refined with the pose: all of the result refers to the cameras with it,
+     which tv_corrected_pair computes. 0 where the focal length is as given. */
   double focal_scale;
   /* The relative standard deviation of the focal length (of camera0's, where the cameras differ)
-     that the covariance contains: what the matches leave of focal_sigma0 where it was refined, else
-     focal_sigma0 as given. 0 where it is taken as exact, or there is no covariance. Bundle
-     adjustment in tv_reconstruct leaves it, and the covariance that contains it, as the estimate
-     has them. */
+     that the covariance contains: what the matches leave of the given one where the focal length
+     was refined, else the given one. 0 where it is taken as exact, or there is no covariance.
+     Bundle adjustment in tv_reconstruct leaves it, and the covariance that contains it, as the
+     estimate has them. */
   double focal_sigma;
 } tv_two_view;
 
@@ -325,7 +316,7 @@ typedef struct tv_evidence {
      image are left out: of the part that turns it most, the mean of both images; [0, pi]. 0 without
      a full pose. */
   double region_shift_rad;
-  /* Evidence against (cx, cy) as they were given, whatever principal_point_sigma is: chi-square
+  /* Evidence against (cx, cy) as they were given, whatever may be refined: chi-square
      with two degrees of freedom where they are right, so that it exceeds 13.8 in one pair of a
      thousand. This field and the next two are 0 where the evidence is not known: where camera0 and
      camera1 differ, the kind is not TV_KIND_CALIBRATED, or the matches do not determine a shift.

@@ -14,7 +14,8 @@ namespace tv {
 namespace {
 
 constexpr tv_odometry_options kDefaults = {
-    sizeof(tv_odometry_options), 1000, 200, 20000, 10, TV_KERNELS_AUTO, 20130814, 1, 0};
+    sizeof(tv_odometry_options), 1000, 200, 20000, 10, TV_KERNELS_AUTO, 20130814,
+    TV_REFINE_PRINCIPAL_POINT,   0};
 
 tv_status make_plan(const tv_camera* camera, const tv_odometry_options* options, MemoryPlan* plan) {
   tv_status status = tv_camera_check(camera);
@@ -26,8 +27,9 @@ tv_status make_plan(const tv_camera* camera, const tv_odometry_options* options,
   const tv_odometry_options& o = plan->options;
   if (!within(o.max_keypoints, 100, 4096) || !within(o.max_keyframes, 8, 2000) ||
       !within(o.max_points, 500, 200000) || !within(o.window, 3, 20) ||
-      !within(o.kernels, TV_KERNELS_AUTO, TV_KERNELS_NEON) || !within(o.correct_camera, 0, 1) ||
-      o.reserved != 0 || !within(camera->width, 32, 16384) || !within(camera->height, 32, 16384)) {
+      !within(o.kernels, TV_KERNELS_AUTO, TV_KERNELS_NEON) ||
+      (o.refine & ~uint32_t{TV_REFINE_PRINCIPAL_POINT}) != 0 || o.reserved != 0 ||
+      !within(camera->width, 32, 16384) || !within(camera->height, 32, 16384)) {
     return TV_ERR_ARGUMENT;
   }
   plan->limits = context_limits(plan->camera, o);

@@ -7,6 +7,7 @@
 #include "api/camera_pair.h"
 #include "api/sized.h"
 #include "api/validate.h"
+#include "api/within.h"
 #include "base/math.h"
 #include "pipeline/pair_result.h"
 
@@ -28,23 +29,29 @@ constexpr tv_estimate_options kDefaults = {sizeof(tv_estimate_options),
                                            {0, 0, 0},
                                            {0, 0, 0},
                                            0,
-                                           0,
-                                           0,
-                                           0,
-                                           0,
-                                           0,
+                                           {},
+                                           {},
                                            kReadoutTurn,
                                            0,
                                            0};
 
-// Checks the standard deviations of the cameras and of their turns, each in [0, 0.5].
-tv_status check_calibration_sigmas(const tv_estimate_options& options) {
-  for (const double sigma : {options.focal_sigma0, options.focal_sigma1, options.center_sigma0,
-                             options.center_sigma1, options.readout_turn_sigma_rad}) {
-    if (!is_finite(sigma)) return TV_ERR_NOT_FINITE;
-    if (!(sigma >= 0 && sigma <= 0.5)) return TV_ERR_ARGUMENT;
+constexpr double kMostSigma = 0.5;
+
+// Checks how uncertain the cameras are, and how far they may turn.
+tv_status check_calibrations(const tv_estimate_options& options) {
+  constexpr uint32_t kRefined = TV_REFINE_FOCAL_LENGTH | TV_REFINE_PRINCIPAL_POINT;
+  const tv_calibration *const c0 = &options.calibration0, *const c1 = &options.calibration1;
+  const uint32_t refine = c0->refine | c1->refine;
+  if ((refine & ~kRefined) != 0 || c0->reserved != 0 || c1->reserved != 0) return TV_ERR_ARGUMENT;
+  const double most_of_center = (refine & TV_REFINE_PRINCIPAL_POINT) != 0 ? 0.1 : kMostSigma;
+  for (const tv_calibration* c : {c0, c1}) {
+    if (!is_finite(c->focal_sigma) || !is_finite(c->center_sigma)) return TV_ERR_NOT_FINITE;
+    if (!within(c->focal_sigma, 0.0, kMostSigma) || !within(c->center_sigma, 0.0, most_of_center)) {
+      return TV_ERR_ARGUMENT;
+    }
   }
-  return TV_OK;
+  if (!is_finite(options.readout_turn_sigma_rad)) return TV_ERR_NOT_FINITE;
+  return within(options.readout_turn_sigma_rad, 0.0, kMostSigma) ? TV_OK : TV_ERR_ARGUMENT;
 }
 
 // Writes the result. Not inlined, so that its stack frame is not in use during the search.
@@ -94,16 +101,15 @@ tv_status read_estimate_options(const tv_estimate_options* options, bool calibra
     checked->method = calibrated ? TV_SOLVER_FIVE_POINT : TV_SOLVER_EIGHT_POINT;
   }
   if (!is_finite(checked->max_error_px) || !is_finite(checked->confidence) ||
-      !is_finite(checked->gravity_sigma_rad) || !is_finite(checked->principal_point_sigma)) {
+      !is_finite(checked->gravity_sigma_rad)) {
     return TV_ERR_NOT_FINITE;
   }
   const bool in_range = checked->max_error_px > 0 && checked->max_error_px <= 1e9 &&
                         checked->confidence >= 0 && checked->confidence < 1 &&
                         checked->max_iterations >= 1 && checked->max_iterations <= 1000000 &&
                         checked->fixed_iterations >= 0 && checked->fixed_iterations <= 1000000 &&
-                        checked->principal_point_sigma >= 0 &&
-                        checked->principal_point_sigma <= 0.1 && checked->num_trials >= 0 &&
-                        checked->num_trials <= 10000 && checked->reserved == 0;
+                        checked->num_trials >= 0 && checked->num_trials <= 10000 &&
+                        checked->reserved == 0;
   const bool with_gravity = checked->gravity_sigma_rad > 0;
   const bool method_known = checked->method == TV_SOLVER_EIGHT_POINT ||
                             checked->method == TV_SOLVER_SEVEN_POINT ||
@@ -111,7 +117,7 @@ tv_status read_estimate_options(const tv_estimate_options* options, bool calibra
                             (checked->method == TV_SOLVER_UPRIGHT && calibrated && with_gravity);
   if (!in_range || !method_known) return TV_ERR_ARGUMENT;
   checked->num_trials = std::max(checked->num_trials, 1);
-  const tv_status sigmas = check_calibration_sigmas(*checked);
+  const tv_status sigmas = check_calibrations(*checked);
   return sigmas != TV_OK
              ? sigmas
              : check_gravity(checked->gravity0, checked->gravity1, checked->gravity_sigma_rad);

@@ -10,5 +10,6 @@ inline bool within(int32_t value, int32_t low, int32_t high) {
   return value >= low && value <= high;
 }
 inline bool within(float value, float low, float high) { return value >= low && value <= high; }
+inline bool within(double value, double low, double high) { return value >= low && value <= high; }
 
 }  // namespace tv

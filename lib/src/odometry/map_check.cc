@@ -25,7 +25,7 @@ void add_vote(Odometry* odometry, const tv_keypoint* keypoints0, const tv_keypoi
     ++vote->num_planar;
   }
   if (view.verdict != TV_VERDICT_OK || !view.has_R || !view.has_covariance) return;
-  if (odometry->options.correct_camera != 0) {
+  if (odometry->options.refine != 0) {
     add_evidence(*pair.evidence, odometry->camera.model.fx, &odometry->camera_evidence);
   }
   const double difference = turn_between(cam1_from_cam0, rigid_of(view.R, view.t));

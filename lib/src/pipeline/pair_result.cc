@@ -5,6 +5,7 @@
 
 #include "base/math.h"
 #include "geometry/essential.h"
+#include "robust/calibration.h"
 #include "robust/covariance.h"
 
 namespace tv {
@@ -124,7 +125,7 @@ void write_estimate(const PairEstimate& estimate, tv_two_view* result) {
   r.focal_scale = outcome.focal_scale;
   r.focal_sigma = outcome.focal_sigma;
   if (outcome.has_covariance && !problem.one_camera) {
-    r.focal_sigma = estimate.swapped ? problem.options.focal_sigma1 : problem.options.focal_sigma0;
+    r.focal_sigma = calibration_of(problem, estimate.swapped ? 1 : 0).focal_sigma;
   }
   const Mat3& R = outcome.epipolar.pose.R;
   r.has_R = outcome.has_R;

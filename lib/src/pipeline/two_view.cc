@@ -5,6 +5,7 @@
 #include <new>
 #include <utility>
 
+#include "robust/calibration.h"
 #include "robust/place_focal_length.h"
 #include "robust/still.h"
 
@@ -62,7 +63,7 @@ void search_and_finish(tv_context* context, PairEstimate& e) {
   {
     StageTimer timer(context, TV_STAGE_ESTIMATE);
     prepare_matches(e.problem, context->arena, &e.matches);
-    if (e.problem.calibrated && has_uncertain_focal_length(e.problem)) {
+    if (refines_focal_length(e.problem)) {
       search_focal_length(e.problem, &e.matches, context->arena, &e.model);
     } else {
       search_two_view(e.problem, e.matches, context->arena, &e.model);
@@ -125,8 +126,11 @@ bool pose_problem(const tv_pixel_pairs& pairs, const tv_camera* cameras[2],
   problem.one_camera =
       problem.calibrated && std::memcmp(cameras[0], cameras[1], sizeof *cameras[0]) == 0;
   if (problem.one_camera) {
-    o.focal_sigma0 = o.focal_sigma1 = std::max(o.focal_sigma0, o.focal_sigma1);
-    o.center_sigma0 = o.center_sigma1 = std::max(o.center_sigma0, o.center_sigma1);
+    tv_calibration &a = o.calibration0, &b = o.calibration1;
+    a.focal_sigma = std::max(a.focal_sigma, b.focal_sigma);
+    a.center_sigma = std::max(a.center_sigma, b.center_sigma);
+    a.refine |= b.refine;
+    b = a;
   }
   const bool swapped = exchanged(cameras[0], cameras[1], problem);
   if (swapped) {
@@ -134,8 +138,7 @@ bool pose_problem(const tv_pixel_pairs& pairs, const tv_camera* cameras[2],
     std::swap(problem.pixels[0], problem.pixels[1]);
     std::swap(problem.sigmas[0], problem.sigmas[1]);
     std::swap(o.gravity0, o.gravity1);
-    std::swap(o.focal_sigma0, o.focal_sigma1);
-    std::swap(o.center_sigma0, o.center_sigma1);
+    std::swap(o.calibration0, o.calibration1);
   }
   if (problem.calibrated) take_cameras(cameras, problem);
   return swapped;

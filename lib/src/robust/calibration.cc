@@ -13,17 +13,16 @@ constexpr int kPose = PoseModel::kParameters, kAll = 2 * kOfView;
 
 // The standard deviation of a view's k-th parameter.
 double sigma_of(const TwoViewProblem& problem, int view, int k) {
-  const tv_estimate_options& o = problem.options;
-  if (k == 0) return view == 0 ? o.focal_sigma0 : o.focal_sigma1;
-  return view == 0 ? o.center_sigma0 : o.center_sigma1;
+  const tv_calibration& given = calibration_of(problem, view);
+  return k == 0 ? given.focal_sigma : given.center_sigma;
 }
 
 }  // namespace
 
 bool has_calibration_sigmas(const TwoViewProblem& problem) {
-  const tv_estimate_options& o = problem.options;
+  const tv_calibration &a = calibration_of(problem, 0), &b = calibration_of(problem, 1);
   return problem.calibrated &&
-         (o.focal_sigma0 > 0 || o.focal_sigma1 > 0 || o.center_sigma0 > 0 || o.center_sigma1 > 0);
+         (a.focal_sigma > 0 || b.focal_sigma > 0 || a.center_sigma > 0 || b.center_sigma > 0);
 }
 
 void calibration_equations(const PoseRefiner& f, int count, const Pose& pose,

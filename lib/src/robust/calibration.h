@@ -10,6 +10,18 @@ namespace tv {
 // Above this relative standard deviation the focal length of one camera is refined with the pose.
 inline constexpr double kUncertainFocal = 0.02;
 
+// How uncertain the camera of a view is; the same for both views of one camera.
+inline const tv_calibration& calibration_of(const TwoViewProblem& problem, int view) {
+  return view == 0 ? problem.options.calibration0 : problem.options.calibration1;
+}
+
+// Whether one camera saw both views, and its focal length is refined with the pose.
+inline bool refines_focal_length(const TwoViewProblem& problem) {
+  const tv_calibration& given = calibration_of(problem, 0);
+  return problem.one_camera && (given.refine & TV_REFINE_FOCAL_LENGTH) != 0 &&
+         given.focal_sigma > kUncertainFocal;
+}
+
 // Whether the options give the cameras a standard deviation.
 bool has_calibration_sigmas(const TwoViewProblem& problem);
 

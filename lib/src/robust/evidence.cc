@@ -271,7 +271,7 @@ void measure_inliers(Fit& f) {
   evidence.threshold_px = f.threshold;
   evidence.num_trials = f.problem.options.num_trials;
   const double focal_sigma =
-      std::max(f.problem.options.focal_sigma0, f.problem.options.focal_sigma1);
+      std::max(calibration_of(f.problem, 0).focal_sigma, calibration_of(f.problem, 1).focal_sigma);
   evidence.is_camera_assumed = focal_sigma > kUncertainFocal;
   evidence.focal_sigma = f.problem.one_camera ? out.focal_sigma : focal_sigma;
   for (int v = 0; v < 2; ++v) measure_spread(f, v, evidence);

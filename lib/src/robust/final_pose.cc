@@ -276,7 +276,8 @@ bool move_together(const PoseRefiner& f, Pose* pose, double shift_px[2]) {
 bool step_focal_length(const PoseRefiner& f, double* growth, Pose* pose, double* step) {
   constexpr int kNum = PoseModel::kParameters + 1;
   constexpr double kStays = 0.64;  // the share of the prior's variance that is left
-  const double sigma = f.problem.options.focal_sigma0, log_scale = f.problem.focal_log_scale;
+  const double sigma = calibration_of(f.problem, 0).focal_sigma;
+  const double log_scale = f.problem.focal_log_scale;
   const GravityPrior gravity = tested_gravity(f, *pose);
   if (*growth == 0) {
     PoseUncertainty uncertainty;
@@ -320,7 +321,7 @@ bool uncertainty_of(const PoseRefiner& f, const Pose& pose, PoseUncertainty* unc
   const double growth =
       add_correlation(f, listed.count, PoseModel{pose}, listed.loss, *uncertainty, shared);
   std::copy(shared, shared + 25, all);
-  const double sigma = f.problem.options.focal_sigma0;
+  const double sigma = calibration_of(f.problem, 0).focal_sigma;
   uncertainty->focal_sigma = sigma;
   CalibrationEquations e;
   CalibrationSlopes slopes;
@@ -337,15 +338,16 @@ bool uncertainty_of(const PoseRefiner& f, const Pose& pose, PoseUncertainty* unc
       for (double* c : {noise, shared}) add_calibration(f.problem, slopes, variance, true, c);
       uncertainty->focal_sigma = std::sqrt(variance);
     }
-    add_calibration(f.problem, slopes, variance, false, all);
+    // What a refined principal point adds is in the covariance already.
+    add_calibration(f.problem, slopes, variance, f.principal_point.is_free, all);
   }
   add_camera_misfit(f, listed.count, pose, listed.loss, &uncertainty->misfit, all);
   if (gravity.known) {
     for (double* c : {noise, shared, all}) add_gravity_information(gravity, pose.R, c);
   }
-  // The focal lengths of two cameras are not refined, and count in the verdict where uncertain.
-  const bool counts =
-      !f.problem.one_camera && std::max(sigma, f.problem.options.focal_sigma1) > kUncertainFocal;
+  // Focal lengths that are not refined count in the verdict where they are uncertain.
+  const bool counts = !refines_focal_length(f.problem) &&
+                      std::max(sigma, calibration_of(f.problem, 1).focal_sigma) > kUncertainFocal;
   uncertainty->sigma_rad = std::max(largest_sigma(noise), counts ? rotation_sigma(all) : 0);
   uncertainty->direction_sigma_rad = direction_sigma(pose.t, counts ? all : shared);
   std::copy(all, all + 25, noise);
@@ -383,7 +385,7 @@ int refine_on_plane(const PoseRefiner& f, const Mat3& H, const Vec3& mean_ray0, 
     std::copy(noise, noise + 25, shared);
     add_correlation(f, count, twins[k], loss, uncertainty, shared);
     std::copy(shared, shared + 25, all);
-    uncertainty.focal_sigma = f.problem.options.focal_sigma0;
+    uncertainty.focal_sigma = calibration_of(f.problem, 0).focal_sigma;
     if (has_calibration_sigmas(f.problem)) {
       CalibrationSlopes slopes;
       plane_slopes(f.problem, twins[k].matrix(), mean_ray0, twins[k].pose, &slopes);

@@ -32,13 +32,10 @@ void scale_focal_length(TwoViewProblem& problem, double factor, Matches* matches
 
 }  // namespace
 
-bool has_uncertain_focal_length(const TwoViewProblem& problem) {
-  return problem.one_camera && problem.options.focal_sigma0 > kUncertainFocal;
-}
-
 void search_focal_length(TwoViewProblem& problem, Matches* matches, Arena& arena,
                          TwoViewModel* model) {
-  const double sigma = problem.options.focal_sigma0, threshold = problem.options.max_error_px;
+  const double sigma = calibration_of(problem, 0).focal_sigma;
+  const double threshold = problem.options.max_error_px;
   double least = 0, best = 0, now = 0, costs[kNumStarts];
   double directions[kNumStarts][3];
   int num_iterations = 0, num_found = 0;
@@ -77,7 +74,7 @@ void place_focal_length(Fit& f) {
   constexpr int kSteps = 8;
   constexpr double kSmallStep = 1e-5;
   TwoViewProblem& problem = f.problem;
-  if (!has_uncertain_focal_length(problem)) return;
+  if (!refines_focal_length(problem)) return;
   Pose& pose = f.out->epipolar.pose;
   double growth = 0, step = 1;
   for (int k = 0; k < kSteps && std::fabs(step) > kSmallStep; ++k) {

@@ -1,14 +1,10 @@
-// The focal length of the one camera that saw both views, refined with the pose where the options
-// call it uncertain. docs/algorithms/covariance.md.
+// The focal length of the one camera that saw both views, refined with the pose. Both functions are
+// for a pair with refines_focal_length (robust/calibration.h). docs/algorithms/covariance.md.
 #pragma once
 
 #include "robust/fit.h"
 
 namespace tv {
-
-// Whether one camera saw both views, and its focal length has a standard deviation above
-// kUncertainFocal. The two functions below are for such a pair.
-bool has_uncertain_focal_length(const TwoViewProblem& problem);
 
 // In place of search_two_view: searches the pose at seven focal lengths within 1.5 deviations of
 // the given one. A pose that was found at a wrong one is often at a minimum of its own, which no

@@ -8,7 +8,7 @@
 
 namespace cli {
 
-// How sure a calibration is: relative standard deviation of the focal length, and standard
+// How uncertain a calibration is: relative standard deviation of the focal length, and standard
 // deviation of the principal point in focal lengths.
 struct CalibrationSigmas {
   double focal, center;

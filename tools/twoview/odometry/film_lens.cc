@@ -159,7 +159,8 @@ class FilmPairs {
     pixels.ratios = pair.ratios.data();
     tv_estimate_options options;
     tv_estimate_options_init(&options);
-    options.focal_sigma0 = options.focal_sigma1 = kPriorLogFocal;
+    options.calibration0 = {kPriorLogFocal, 0, TV_REFINE_FOCAL_LENGTH, 0};
+    options.calibration1 = options.calibration0;
     options.max_iterations = 1000;
     tv_two_view_init(found);
     check(tv_estimate_two_view(session_.get(), &camera, &camera, &pixels, &options, found, nullptr,
@@ -229,7 +230,7 @@ FilmLens estimate_film_lens(FrameSource& source, const FlightOptions& options,
   for (int round = 0; round < kRounds && !stop; ++round) {
     FlightOptions scouting = options;
     scouting.camera = result.camera();
-    scouting.odometry.correct_camera = 0;
+    scouting.odometry.refine = TV_REFINE_NOTHING;
     scouting.max_frames =
         options.max_frames == 0 ? kMostFrames : std::min(options.max_frames, kMostFrames);
     scouting.keeps_pictures = false;

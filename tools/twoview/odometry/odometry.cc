@@ -213,7 +213,7 @@ nlohmann::ordered_json options_of(const Arguments& a, const std::string& truth_f
                                  {"max_keyframes", o.max_keyframes},
                                  {"max_points", o.max_points},
                                  {"window", o.window},
-                                 {"keep_camera", o.correct_camera == 0},
+                                 {"keep_camera", o.refine == TV_REFINE_NOTHING},
                                  {"max_frames", a.flight.max_frames},
                                  {"every", a.flight.every},
                                  {"fps", a.fps}};
@@ -554,7 +554,7 @@ int odometry(Arguments& a) {
   Common& common = a.common;
   common.options.kernels = a.flight.odometry.kernels;
   a.flight.camera_file = a.camera;
-  a.flight.odometry.correct_camera = a.keeps_camera ? 0 : 1;
+  a.flight.odometry.refine = a.keeps_camera ? TV_REFINE_NOTHING : TV_REFINE_PRINCIPAL_POINT;
   if (a.flight.focal_35mm != 0 && !a.camera.empty())
     throw BadInput("--focal-35mm is for films and photographs without a camera file");
   if (a.flight.scales_camera && a.camera.empty())

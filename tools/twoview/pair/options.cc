@@ -90,9 +90,9 @@ std::vector<Option> table(Options& o) {
       {"fixed-iterations", kEstimate, &e.fixed_iterations, 0, 1e6, closed,
        "exactly this many samples; 0: adaptive stop"},
       {"seed", kEstimate, &e.seed, 0, kLargestSeed, closed, "of the sampler"},
-      {"principal-point-sigma", kEstimate, &e.principal_point_sigma, 0, 0.1, closed,
+      {"principal-point-sigma", kEstimate, &o.principal_point_sigma, 0, 0.1, closed,
        "how far the principal point may be moved: standard deviation in focal lengths, such as "
-       "0.01; 0: it is where the camera file has it"},
+       "0.01, in place of --center-sigma; 0: it is where the camera file has it"},
       {"readout-turn-sigma-rad", kEstimate, &e.readout_turn_sigma_rad, 0, 0.5, closed,
        "how far the camera may turn while it reads the rows of a picture (rolling shutter): "
        "standard deviation in radians; 0: it exposes all rows at once"},
@@ -302,6 +302,21 @@ void Options::settle() {
   if (estimate.method == TV_SOLVER_UPRIGHT && !given[0])
     throw BadInput("--method upright needs --gravity0, --gravity1 and --gravity-sigma-deg");
   estimate.gravity_sigma_rad = gravity_sigma_deg * 3.14159265358979323846 / 180;
+}
+
+void Options::set_calibrations(const CalibrationSigmas& first, const CalibrationSigmas& second) {
+  const auto calibration = [this](const CalibrationSigmas& of_camera) {
+    tv_calibration c{of_camera.focal, of_camera.center, TV_REFINE_FOCAL_LENGTH, 0};
+    if (focal_sigma >= 0) c.focal_sigma = focal_sigma;
+    if (center_sigma >= 0) c.center_sigma = center_sigma;
+    if (principal_point_sigma > 0) {
+      c.center_sigma = principal_point_sigma;
+      c.refine |= TV_REFINE_PRINCIPAL_POINT;
+    }
+    return c;
+  };
+  estimate.calibration0 = calibration(first);
+  estimate.calibration1 = calibration(second);
 }
 
 int32_t Options::longer_side(int32_t width, int32_t height) const {

@@ -8,6 +8,7 @@
 #include <variant>
 
 #include "base/cli_fwd.h"
+#include "files/camera_file.h"
 #include "files/mask_file.h"
 #include "twoview/twoview.h"
 
@@ -34,14 +35,19 @@ struct Options {
   int32_t resize = kByItself;
   bool was_large = false;  // kByItself made an image smaller
   bool min_threshold_given = false;
-  // Of the calibration (tv_estimate_options); below 0: what the camera file says.
+  // Of both calibrations; below 0: what the camera file says.
   double focal_sigma = -1, center_sigma = -1;
-  Masks masks;                   // of the pictures whose corners are found
-  double gravity_sigma_deg = 0;  // settle() copies it, in radians, to `estimate`
+  double principal_point_sigma = 0;  // above 0: the principal point may be refined
+  Masks masks;                       // of the pictures whose corners are found
+  double gravity_sigma_deg = 0;      // settle() copies it, in radians, to `estimate`
 
   Options();
   // Checks and completes the options that depend on each other. Call it once, after parsing.
   void settle();
+  // Writes the calibrations of `estimate`: the sigmas of the command line, else those of the
+  // cameras. Focal lengths may be refined, and the principal point with a principal_point_sigma,
+  // which then takes the place of center_sigma.
+  void set_calibrations(const CalibrationSigmas& first, const CalibrationSigmas& second);
   // The rung to begin with, and the highest one.
   int32_t first_rung() const { return effort >= kEffort0 ? effort - kEffort0 : 0; }
   int32_t highest_rung() const { return effort == kEffortAuto ? kHighestRung : first_rung(); }

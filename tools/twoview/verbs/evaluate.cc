@@ -480,9 +480,7 @@ Cameras load_cameras(Arguments& a) {
     cameras.set = load_camera_set(set_path.string(), &left_out);
     if (!left_out.empty()) a.common.note(left_out_note(set_path.string(), left_out));
   }
-  tv_estimate_options& options = a.common.options.estimate;
-  options.focal_sigma0 = options.focal_sigma1 = sigmas.focal;
-  options.center_sigma0 = options.center_sigma1 = sigmas.center;
+  a.common.options.set_calibrations(sigmas, sigmas);
   return cameras;
 }
 

@@ -160,18 +160,6 @@ ImageCameras choose_cameras(Arguments& a, const Picture pictures[2]) {
   return {};
 }
 
-// The sigmas of the calibration: those that the command line gives, else those of the cameras.
-void set_calibration_sigmas(Options& options, const ImageCameras& cameras) {
-  tv_estimate_options& e = options.estimate;
-  double* const focal[2] = {&e.focal_sigma0, &e.focal_sigma1};
-  double* const center[2] = {&e.center_sigma0, &e.center_sigma1};
-  for (size_t i = 0; i < 2; ++i) {
-    const CalibrationSigmas& sigmas = cameras[i].sigmas;
-    *focal[i] = options.focal_sigma >= 0 ? options.focal_sigma : sigmas.focal;
-    *center[i] = options.center_sigma >= 0 ? options.center_sigma : sigmas.center;
-  }
-}
-
 // Loads the pictures and the cameras, scales both as --resize says, and sets the calibration's
 // sigmas.
 ImageCameras load_inputs(Arguments& a, RecordingInput* recording, Session& session,
@@ -181,7 +169,7 @@ ImageCameras load_inputs(Arguments& a, RecordingInput* recording, Session& sessi
     const ImageFacts frame{"", recording->width(), recording->height(), {}};
     cameras = a.cameras.cameras_of(frame, frame);
     // Before load, which estimates pairs of frames to choose one.
-    set_calibration_sigmas(a.common.options, cameras);
+    a.common.options.set_calibrations(cameras[0].sigmas, cameras[1].sigmas);
     const Progress progress(!a.common.quiet);
     recording->load(cameras[0].camera, session, a.common.options, progress, outcome);
   } else {
@@ -189,7 +177,7 @@ ImageCameras load_inputs(Arguments& a, RecordingInput* recording, Session& sessi
     turn_to_cameras(a, outcome.picture, a.common);
     note_turns(outcome.picture, a.common);
     cameras = choose_cameras(a, outcome.picture);
-    set_calibration_sigmas(a.common.options, cameras);
+    a.common.options.set_calibrations(cameras[0].sigmas, cameras[1].sigmas);
   }
   for (const ImageCamera& camera : cameras)
     for (const std::string& line : camera.notes) a.common.note(line);

@@ -11,7 +11,8 @@ others equal shares, half of a share at the gaps 1, 2, 4, 8 .. in turn, half at 
 Each pair goes from the images to the pose by tv_reconstruct with its defaults, the set's camera and
 the standard deviations that the program takes for a plain camera file: 0.01 of the focal length,
 0.005 focal lengths of the principal point. The verdict does not read these. The library's own
-default, an exact camera: --estimate focal_sigma0=0 focal_sigma1=0 center_sigma0=0 center_sigma1=0.
+default, an exact camera: --estimate calibration0.focal_sigma=0 calibration0.center_sigma=0 and the
+same of calibration1.
 --effort auto climbs as `twoview reconstruct` does while a pair is not "ok", to rung 3; the default
 is the library's, rung 0. One table more then has the "ok" and the covariance by the rung of the
 result.
@@ -51,13 +52,14 @@ import json
 import sys
 
 import numpy as np
+import twoview
 
 from . import (belief_fit, belief_tables, datasets, match_evidence, metrics, parallel, pipeline,
                reliability, tables, truth, twoview_ctypes, verdicts)
 
 ZOOMS = (1.25, 1.5, 2.0)
-PLAIN_CAMERA = {"focal_sigma0": 0.01, "focal_sigma1": 0.01,
-                "center_sigma0": 0.005, "center_sigma1": 0.005}
+PLAIN_CAMERA = {f"calibration{i}.{part}": value for i in (0, 1)
+                for part, value in twoview.PLAIN_FILE._asdict().items()}
 UNRELATED_IMAGES = 15  # of each set, evenly spaced
 CHUNK = 250  # unrelated pairs of one piece of work
 

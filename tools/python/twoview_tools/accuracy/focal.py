@@ -11,12 +11,13 @@ import argparse
 import os
 
 import numpy as np
+import twoview
 
 from . import belief, datasets, truth, twoview_ctypes
 
 FACTORS = (0.9, 1.0, 1.1)
-FILM = {"focal_sigma0": 0.1, "focal_sigma1": 0.1,  # kFilm of tools/twoview
-        "center_sigma0": 0.01, "center_sigma1": 0.01}
+FILM = {f"calibration{i}.{part}": value for i in (0, 1)
+        for part, value in twoview.FILM._asdict().items()}
 
 
 class ScaledViews(belief.Views):

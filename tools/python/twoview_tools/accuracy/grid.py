@@ -3,7 +3,7 @@
 
   scripts/accuracy --grid FILE --jobs 2
   scripts/python -m twoview_tools.accuracy.grid --feature levels=1,4 scale_factor=1.41,2 \\
-      --feature threshold=5 --match ratio=0.87,0.92 --estimate principal_point_sigma=0
+      --feature threshold=5 --match ratio=0.87,0.92 --estimate calibration0.focal_sigma=0,0.01
 
 --feature, --match and --estimate may be repeated. Each one is an alternative: KEY=VALUE,VALUE..
 words, of which every combination is taken; the grid is every feature alternative with every match
@@ -13,7 +13,7 @@ alternative with every estimate alternative. FILE holds the same, one alternativ
   feature levels=4 scale_factor=1.41 cell_px=0,24
   feature                                 # no words: the library's defaults
   match ratio=0.87,0.92
-  estimate principal_point_sigma=0
+  estimate calibration0.focal_sigma=0,0.01
   point feature.levels=4 match.ratio=0.9  # besides the product: this point (commas work here, too)
 
 --lib A.so --lib B.so takes every point with each of these builds: so constants are varied that are
@@ -105,8 +105,7 @@ def canonical(library, point):
             fields["sigma_by_size"] = library.take_sigma_by_size(options)
         struct = getattr(library, stage + "_options")(options)
         for name, _ in struct._fields_[1:]:
-            value = getattr(struct, name)
-            fields[name] = list(value) if hasattr(value, "_length_") else value
+            fields[name] = twoview_ctypes.plain(getattr(struct, name))
         texts.append(json.dumps(fields, sort_keys=True))
     return tuple(texts)
 

@@ -36,14 +36,17 @@ def _number(struct, field, text):
 
 def set_options(struct, options):
     """Writes a dict {field: value} into a struct; a value is a number, or text as on a command
-    line."""
+    line. "calibration0.refine" is a field of the field calibration0."""
     for key, value in (options or {}).items():
-        field = key.replace("-", "_")
+        *outer, field = key.replace("-", "_").split(".")
         try:
+            part = struct
+            for name in outer:
+                part = getattr(part, name)
             if isinstance(value, str):
-                value = _number(struct, field, value)
-            _abi.set_field(struct, field, value)
-        except (TypeError, ValueError) as error:
+                value = _number(part, field, value)
+            _abi.set_field(part, field, value)
+        except (AttributeError, TypeError, ValueError) as error:
             raise TwoviewError(str(error)) from error
     return struct
 
@@ -88,9 +91,17 @@ class Library(twoview.Library):
 MAX_EFFORT = 3  # the highest rung of tv_reconstruct_options.max_effort
 
 
+def plain(value):
+    """A field's value: of an array a list, of a calibration a Calibration, else as it is."""
+    if isinstance(value, _abi.tv_calibration):
+        return twoview.Calibration(value.focal_sigma, value.center_sigma, value.refine)
+    return list(value) if hasattr(value, "_length_") else value
+
+
 def _keywords(struct):
     """The fields of an options struct as keywords for the package's functions."""
-    return {name: getattr(struct, name) for name, _ in struct._fields_[1:] if name != "reserved"}
+    return {name: plain(getattr(struct, name)) for name, _ in struct._fields_[1:]
+            if name != "reserved"}
 
 
 class Context(twoview.Context):

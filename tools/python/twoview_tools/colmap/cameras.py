@@ -22,10 +22,10 @@ def read_camera(path):
         return _camera(formats.read_camera(path))
 
 
-def read_sigmas(path):
-    """How sure the calibration of a camera file is."""
+def read_calibration(path):
+    """How uncertain the calibration of a camera file is."""
     with refused(path):
-        return tv.read_sigmas(path)
+        return tv.read_calibration(path)
 
 
 def read_camera_set(path):

@@ -100,8 +100,7 @@ def _add_export(verbs):
     parser.add_argument("--effort", choices=tuple(settings.EFFORTS), default="auto",
                         help="try pairs that are not ok with squeezed views, too (auto), or with "
                              "one rung alone; fixed: 0 (default: auto)")
-    settings.add_options(parser, max_keypoints=settings.MAPPING_KEYPOINTS,
-                         principal_point_sigma=settings.PRINCIPAL_POINT_SIGMA_OF_A_DATABASE)
+    settings.add_options(parser, max_keypoints=settings.MAPPING_KEYPOINTS)
     parser.set_defaults(run=_export)
 
 
@@ -202,7 +201,7 @@ def _import(arguments):
         settings.options_of(a, tv.MatchOptions),
         settings.options_of(a, tv.EstimateOptions),
         a.quiet or a.json,
-        lambda sigmas: settings.sigmas_of(a, sigmas),
+        lambda known: settings.calibrations_of(a, known),
     )
     posed = sum(row["R"] is not None and row["t"] is not None for row in report["pairs"])
     areas = ", ".join(f"{area:.1f}" for area in report["auc"].values() if area is not None)
@@ -244,7 +243,7 @@ def _words_on_guessed(names, arguments):
     if not names:
         return ""
     from .importer import GUESSED
-    sigma = settings.sigmas_of(arguments, [GUESSED] * 2)["focal_sigma0"]
+    sigma = settings.calibrations_of(arguments, [GUESSED] * 2)["calibration0"].focal_sigma
     return (f"; the focal length of {len(names)} images was guessed (prior_focal_length 0) and "
             f"counts as known to {100 * sigma:g} % (--focal-sigma, or --camera)")
 
@@ -269,7 +268,7 @@ def _add_model(verbs):
 
 
 def _model(arguments):
-    from .cameras import film_camera, read_camera, read_sigmas
+    from .cameras import film_camera, read_calibration, read_camera
     from .images import read_luma
     from .model import text_model
     from .output import require_own, write_files
@@ -280,11 +279,11 @@ def _model(arguments):
         raise BadInput("model needs either --camera or --focal-35mm")
     if a.focal_35mm:
         cameras = [film_camera(a.focal_35mm, *read_luma(path).shape[::-1]) for path in a.images]
-        sigmas = [tv.FILM] * 2
+        known = [tv.FILM] * 2
     else:
         files = (a.camera, a.camera1 or a.camera)
         cameras = [read_camera(path) for path in files]
-        sigmas = [read_sigmas(path) for path in files]
+        known = [read_calibration(path) for path in files]
     files = ("cameras.txt", "images.txt", "points3D.txt", "trajectory.tum")
     require_own(a.output, "colmap model", files, files)
     names = [os.path.basename(path) for path in a.images]
@@ -298,7 +297,7 @@ def _model(arguments):
             raise BadInput(f"image '{name}': COLMAP ends a name of a text model at its first "
                            f"blank; rename the picture")
     estimate = dataclasses.replace(settings.options_of(a, tv.EstimateOptions),
-                                   **settings.sigmas_of(a, sigmas))
+                                   **settings.calibrations_of(a, known))
     pose, model = reconstruct(a.images, names, cameras, settings.options_of(a, tv.FeatureOptions),
                               settings.options_of(a, tv.MatchOptions), estimate,
                               resize=a.resize or 0, mask=a.mask)

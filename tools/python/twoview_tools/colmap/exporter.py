@@ -31,7 +31,7 @@ from .images import MORE, holds_more, list_images, read_luma, shrunk
 from .masks import Masks, shrunk_mask
 from .pairs import exhaustive, read_pairs, sequential
 from .progress import progress
-from .settings import EFFORTS, PRINCIPAL_POINT_SIGMA_OF_A_DATABASE
+from .settings import EFFORTS
 
 PICTURES_IN_MEMORY = 16
 # A keypoint of a squeezed view that is as near to one of the database is that one, so that tracks
@@ -332,9 +332,7 @@ class Climber:
 def export(job, feature=None, match=None, estimate=None):
     """Exports, and returns {what: how many}. On failure the database is as it was before."""
     schema = SCHEMAS[job.schema]
-    engine = Engine(feature, match, estimate or
-                    tv.EstimateOptions(principal_point_sigma=PRINCIPAL_POINT_SIGMA_OF_A_DATABASE),
-                    rungs=EFFORTS[job.effort])
+    engine = Engine(feature, match, estimate, rungs=EFFORTS[job.effort])
     pictures = Pictures(job)
     with (appended_database if job.append else new_database)(job.database, schema) as writer:
         pairs = choose_pairs(job)

@@ -10,7 +10,7 @@ import twoview as tv
 from ..accuracy import metrics  # pose errors have the definition of the accuracy tables
 from ..folders import foreign_words
 from . import database as db
-from .cameras import read_camera, read_sigmas
+from .cameras import read_calibration, read_camera
 from .conventions import HALF_PIXEL, camera_from_colmap, pixels_from_colmap
 from .engine import Engine
 from .errors import BadInput
@@ -23,8 +23,8 @@ from .trajectory import write_trajectory
 # How sure a focal length is that COLMAP guessed: 1.2 times the longer side, 43 mm as for 35 mm film
 # at 3:2. Photographs are taken with 24 to 85 mm as a rule, which is 0.6 below and 0.7 above in the
 # logarithm: two deviations of 0.3.
-GUESSED = tv.CalibrationSigmas(0.3, 0.01)
-EXACT = tv.CalibrationSigmas(0.0, 0.0)
+GUESSED = tv.Calibration(0.3, 0.01, tv.Refine.FOCAL_LENGTH)
+EXACT = tv.Calibration()
 
 
 def _choose(names, pairs_file, overlap):
@@ -117,10 +117,10 @@ class Features:
     def __init__(self, path, camera_files=()):
         self.path = path
         given = [read_camera(file) for file in camera_files]
-        self._sigmas_given = [read_sigmas(file) for file in camera_files]
+        self._calibration_given = [read_calibration(file) for file in camera_files]
         self.pixels, self.descriptors, self.cameras = {}, {}, {}
         self.matches, self.verified = {}, {}  #: by pair of names, as two tables of the database
-        self.sigmas = {}  #: CalibrationSigmas by image
+        self.calibrations = {}  #: Calibration by image
         self.invalid = {}  #: by image: how many of its keypoints are not finite, where any is
         self.outside = {}  #: by image: how many of its keypoints lie outside its picture
         with db.reading(path) as database:
@@ -136,8 +136,8 @@ class Features:
         for name, (image_id, camera_id) in db.read_images(database).items():
             names[image_id] = name
             self.cameras[name] = given[0] if given else _camera(rows[camera_id], f"image {name}")
-            self.sigmas[name] = (self._sigmas_given[0] if given else
-                                 GUESSED if camera_id in guessed else EXACT)
+            self.calibrations[name] = (self._calibration_given[0] if given else
+                                       GUESSED if camera_id in guessed else EXACT)
             self.pixels[name] = pixels_from_colmap(db.read_keypoints(database, self.path, image_id))
             camera = self.cameras[name]
             place = self.pixels[name] + HALF_PIXEL
@@ -166,7 +166,7 @@ class Features:
 
     def guessed(self):
         """The names of the images whose focal length COLMAP guessed."""
-        return sorted(name for name, sigmas in self.sigmas.items() if sigmas is GUESSED)
+        return sorted(name for name, known in self.calibrations.items() if known is GUESSED)
 
     def has_pair(self, name0, name1):
         """Whether a table has matches of the pair."""
@@ -209,9 +209,8 @@ class Features:
                 self.DESCRIPTORS)
 
 
-def _sigmas_as_known(sigmas):
-    return {f"{part}_sigma{i}": value for i, known in enumerate(sigmas)
-            for part, value in known._asdict().items()}
+def _as_known(calibrations):
+    return {f"calibration{i}": known for i, known in enumerate(calibrations)}
 
 
 def _pair_report(name0, name1, features, engine, truth, options):
@@ -242,7 +241,7 @@ def _pair_report(name0, name1, features, engine, truth, options):
             "config": result.kind.name.lower(),
             "verdict": result.verdict.name.lower(),
             "time_ms": None,
-            "focal_sigma": [options.focal_sigma0, options.focal_sigma1],
+            "focal_sigma": [options.calibration0.focal_sigma, options.calibration1.focal_sigma],
         }
     )
     row.update({key: None if value is None else np.ravel(value).tolist()
@@ -289,12 +288,12 @@ def import_database(
     match=None,
     estimate=None,
     quiet=False,
-    sigmas_of=None,
+    calibrations_of=None,
 ):
     """Estimates from a database's features and matches, and writes report.json in the form of
     `twoview evaluate`. Without a pairs file and an overlap it takes the pairs that have matches in
     the database, or all pairs if none has. The truth is that of `model`, else that of the pairs
-    file. sigmas_of: from the two cameras' CalibrationSigmas to the standard deviations of
+    file. calibrations_of: from the Calibrations of two cameras to the calibrations of
     EstimateOptions, {name: value}; None: as the cameras say."""
     _require_own_report(folder)
     features = Features(path, camera_files)
@@ -309,14 +308,14 @@ def import_database(
                     max_matches=max([len(m) for table in (features.matches, features.verified)
                                      for m in table.values()] + [most]))
     estimate = estimate or tv.EstimateOptions()
-    sigmas_of = sigmas_of or _sigmas_as_known
+    calibrations_of = calibrations_of or _as_known
     rows = []
     for pair in progress(pairs, "pair", quiet):
         truth = None if pair.R is None else (pair.R, pair.t)
         if model and pair.name0 in model.images and pair.name1 in model.images:
             truth = relative(model.images[pair.name0], model.images[pair.name1])
-        sigmas = sigmas_of([features.sigmas[name] for name in (pair.name0, pair.name1)])
-        options = dataclasses.replace(estimate, **sigmas)
+        known = [features.calibrations[name] for name in (pair.name0, pair.name1)]
+        options = dataclasses.replace(estimate, **calibrations_of(known))
         rows.append(_pair_report(pair.name0, pair.name1, features, engine, truth, options))
     report = {
         key: {f"{limit:g}": _auc(rows, error, limit) for limit in metrics.THRESHOLDS_DEG}

@@ -9,18 +9,19 @@ _KINDS = (tv.FeatureOptions, tv.MatchOptions, tv.EstimateOptions)
 # The default for a mapper, which is not time-critical and benefits from long tracks: as many
 # keypoints as COLMAP's own extractor (docs/colmap.md).
 MAPPING_KEYPOINTS = 8192
-# The pairs of a database share its cameras, so no pair may have a principal point of its own: the
-# shift is not estimated.
-PRINCIPAL_POINT_SIGMA_OF_A_DATABASE = 0.0
 # Defaults that are automatic in the library have explicit values here, as in the C++ program.
 _EXPLICIT = {"max_keypoints": 2048, "method": tv.Solver.FIVE_POINT}
-# Where the camera says how sure it is: the flags have no number of their own as their default.
-SIGMAS_OF_THE_CAMERA = dict.fromkeys(("focal_sigma0", "focal_sigma1", "center_sigma0",
-                                      "center_sigma1"))
+# The flags of the two calibrations. The principal point of one camera that took both images may be
+# moved where its deviation, which then replaces those of both calibrations, is not 0.
+_CALIBRATIONS = ("principal_point_sigma", "focal_sigma0", "focal_sigma1", "center_sigma0",
+                 "center_sigma1")
+# Where the camera says how uncertain it is: the flags have no number of their own as their default.
+SIGMAS_OF_THE_CAMERA = dict.fromkeys(_CALIBRATIONS[1:])
 _FROM_CAMERA = "that of the camera"
 # --effort: the rung to begin with, and the highest one, of tv_reconstruct_options.
 EFFORTS = {"fixed": (0, 0), "auto": (0, 3), **{str(rung): (rung, rung) for rung in range(4)}}
-_NOT_HERE = ("gravity0", "gravity1", "gravity_sigma_rad")
+_NOT_HERE = ("gravity0", "gravity1", "gravity_sigma_rad", "calibration1")
+_EXACT = (tv.Calibration(),) * 2
 
 
 def _spelt(value):
@@ -49,6 +50,13 @@ def add_options(parser, kinds=_KINDS, **defaults):
         for field in dataclasses.fields(kind):
             if field.name in _NOT_HERE:
                 continue
+            if field.name == "calibration0":
+                for name in _CALIBRATIONS:
+                    default = defaults.get(name, 0.0)
+                    group.add_argument("--" + name.replace("_", "-"), type=float, default=default,
+                                       metavar="X",
+                                       help=_FROM_CAMERA if default is None else f"{default:g}")
+                continue
             flag = "--" + field.name.replace("_", "-")
             default = defaults.get(field.name, _EXPLICIT.get(field.name, field.default))
             is_flag = isinstance(field.default, bool)  # 0 or 1 on the command line
@@ -67,17 +75,26 @@ def add_options(parser, kinds=_KINDS, **defaults):
 
 def options_of(arguments, kind):
     """Makes an options object of class `kind` from the values of the command line's flags."""
-    return kind(**{field.name: getattr(arguments, field.name) for field in dataclasses.fields(kind)
-                   if getattr(arguments, field.name, None) is not None})
+    values = {field.name: getattr(arguments, field.name) for field in dataclasses.fields(kind)
+              if getattr(arguments, field.name, None) is not None}
+    if kind is tv.EstimateOptions:
+        values.update(calibrations_of(arguments))
+    return kind(**values)
 
 
-def sigmas_of(arguments, sigmas):
-    """The four standard deviations of EstimateOptions, of two cameras: those that the command line
-    gives, else `sigmas`, a CalibrationSigmas for each camera."""
-    found = {}
-    for i, known in enumerate(sigmas):
-        for part, value in known._asdict().items():
-            given = getattr(arguments, f"{part}_sigma{i}")
-            both = getattr(arguments, f"{part}_sigma", None)
-            found[f"{part}_sigma{i}"] = next(x for x in (given, both, value) if x is not None)
+def calibrations_of(arguments, known=_EXACT):
+    """The two calibrations of EstimateOptions, {name: value}: the standard deviations that the
+    command line gives, else those of `known`, a Calibration for each camera. Focal lengths may be
+    refined where they are uncertain."""
+    found, moving = {}, arguments.principal_point_sigma
+    for i, calibration in enumerate(known):
+        parts = {"refine": tv.Refine.FOCAL_LENGTH}
+        for part in ("focal_sigma", "center_sigma"):
+            choices = (getattr(arguments, f"{part}{i}"), getattr(arguments, part, None),
+                       getattr(calibration, part))
+            parts[part] = next(x for x in choices if x is not None)
+        if moving != 0:
+            parts["refine"] |= tv.Refine.PRINCIPAL_POINT
+            parts["center_sigma"] = moving
+        found[f"calibration{i}"] = tv.Calibration(**parts)
     return found

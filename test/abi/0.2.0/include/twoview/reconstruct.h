@@ -52,9 +52,9 @@ typedef struct tv_reconstruct_options {
      and helps where few matches pass the ratio test. */
   int32_t guided_matching;
   /* 1: a full pose and the points of its inliers are adjusted together by tv_adjust_two_view with
-     its default options, and R, t, E, F, the covariance and noise_px are those of the adjustment,
-     which takes the cameras as exact, with the focal length as the estimate refined it; 0
-     (default): they are those of the estimate, which was measured to be as accurate
+     its default options, which takes the cameras as exact, and R, t, E and F are those of the
+     adjustment; what was judged stays: covariance, noise_px, verdict. 0 (default): all is the
+     estimate's, which was measured to be as accurate
      (docs/decisions/0005-bundle.md). */
   int32_t bundle_adjustment;
   /* How a keypoint's size gives the noise of its position, the exponent of tv_keypoint_sigmas with

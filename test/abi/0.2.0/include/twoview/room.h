@@ -116,7 +116,8 @@ TV_API tv_status tv_room_init(tv_room **room, const tv_room_options *options, vo
 /* Fuses a depth map.
    map: initialised by tv_depth_map_init; with its camera, its pose and its distances.
    Where the room has no memory left for the blocks that the map needs, TV_ERR_CAPACITY is returned
-   and the room is as it was before; it can go on with a coarser voxel (tv_room_coarsen).
+   and the room is as it was before; it can go on without what one map alone saw (tv_room_prune), or
+   with a coarser voxel (tv_room_coarsen).
    The weight of a pixel is 16 (voxel / sigma)^2, rounded, at most 64; pixels of weight 0 are
    unknown. What lies nearer to the camera than the surface by more than the truncation, and by 3
    sigma, is seen through: a voxel that many maps see through, against the weight with which others
@@ -143,10 +144,21 @@ TV_API tv_status tv_room_remove(tv_room *room, const tv_depth_map *map);
    does not know them any more. Returns TV_ERR_NULL, TV_ERR_LIMITS (after 16 times). */
 TV_API tv_status tv_room_coarsen(tv_room *room);
 
-/* Lets a map that the room holds see through the blocks that were made since it was added, as if it
-   were added after them. What was inferred has to stand up to this: call it for each map after the
-   inferred ones were added. The map has the camera, the pose and the contents with which it was
-   added. Takes the time of tv_room_add at most.
+/* Frees the memory of what fewer than min_maps maps measured: the blocks without a voxel in which
+   that many saw a surface. With the min_maps of tv_room_mesh_options they hold no surface; in a
+   flight it is half of all blocks with 2. Inferred blocks stay. Maps that lose a part so are still
+   removed exactly. Where others measure the same place later on, tv_room_see_through adds the lost
+   part again: called for each map before tv_room_prune, and again at the end, it makes the voxels
+   that min_maps maps saw what they are in unlimited memory.
+   min_maps: [1, 255]. num_freed: receives the number of blocks; null is allowed.
+   Takes a step for each voxel. Returns TV_ERR_NULL, TV_ERR_ARGUMENT (min_maps). */
+TV_API tv_status tv_room_prune(tv_room *room, int32_t min_maps, int32_t *num_freed);
+
+/* Adds a map that the room holds to the blocks that were made since it was added, as if it were
+   added after them: it sees through them, and takes back what tv_room_prune freed of its surface.
+   What was inferred has to stand up to this: call it for each map after the inferred ones were
+   added. The map has the camera, the pose and the contents with which it was added. Takes the time
+   of tv_room_add at most.
    Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (the map or R, or the room holds no such
    map), TV_ERR_NOT_FINITE (R or t), TV_ERR_CAMERA. */
 TV_API tv_status tv_room_see_through(tv_room *room, const tv_depth_map *map);

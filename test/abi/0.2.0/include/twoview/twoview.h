@@ -12,6 +12,7 @@
 #include "twoview/image.h"
 #include "twoview/match.h"
 #include "twoview/odometry.h"
+#include "twoview/path.h"
 #include "twoview/reconstruct.h"
 #include "twoview/room.h"
 #include "twoview/status.h"
