@@ -420,7 +420,7 @@ void add_to_new_blocks(tv_room& room, const RoomView& view, uint32_t added_at) {
   const Fusion f = fusion_of(room, view);
   const bool inferred = view.map.inferred != 0;
   ++room.num_calls;
-  const auto is_new = [&room, added_at](const Block& block) {
+  const auto is_new = [added_at](const Block& block) {
     return block.key != 0 && block.born_at > added_at;
   };
   bool any_near = false;
