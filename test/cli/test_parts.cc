@@ -968,14 +968,19 @@ void test_times_that_are_frame_numbers_are_understood_and_said() {
   TEST_ASSERT_EQUAL_DOUBLE(3, truth.poses[3].time_s);
 }
 
-// A camera that moves by a pixel a picture along a wall with a fine texture; other_by: how far
-// beside it the other eye is, pixels.
-EyesLayout eyes_of(EyesLayout layout, int other_by) {
-  cv::Mat wall(240, 1000, CV_8U);
+cv::Mat fine_wall(int width) {
+  cv::Mat wall(240, width, CV_8U);
   cv::theRNG().state = 7;
   cv::randu(wall, 0, 256);
   cv::GaussianBlur(wall, wall, {9, 9}, 0);
   cv::normalize(wall, wall, 0, 255, cv::NORM_MINMAX);
+  return wall;
+}
+
+// A camera that moves by a pixel a picture along a wall with a fine texture; other_by: how far
+// beside it the other eye is, pixels.
+EyesLayout eyes_of(EyesLayout layout, int other_by) {
+  const cv::Mat wall = fine_wall(1000);
   TwoEyes eyes;
   for (int n = 0; n < 24; ++n) {
     const cv::Mat one = wall(cv::Rect(n, 0, 320, 240));
@@ -1000,11 +1005,7 @@ void test_pictures_of_two_eyes_are_told_from_those_of_one() {
 
 // What is said of pictures of a moving wall of which `combed` of 24 are woven of two moments.
 std::string combed_words(int combed, bool is_mosaic) {
-  cv::Mat wall(240, 400, CV_8U);
-  cv::theRNG().state = 7;
-  cv::randu(wall, 0, 256);
-  cv::GaussianBlur(wall, wall, {9, 9}, 0);
-  cv::normalize(wall, wall, 0, 255, cv::NORM_MINMAX);
+  const cv::Mat wall = fine_wall(400);
   CombedRows rows;
   for (int n = 0; n < 24; ++n) {
     cv::Mat picture = wall(cv::Rect(n, 0, 320, 240)).clone();

@@ -1,10 +1,13 @@
 """The filter that twoview_tools.odometry.autopilot lets fuse the driver's estimates: errors that
 are new with each message, and errors that stay."""
 
+import os
 import types
 import unittest
 
 import numpy as np
+import twoview as tv
+from twoview import _abi
 from twoview_tools.odometry import autopilot
 
 TIMES = np.arange(0, 20, 0.04)
@@ -22,7 +25,7 @@ def largest(errors, sigma, which="PX4"):
     """The largest error of an axis in the filter's standard deviations, and the mean in metres."""
     found = [(time, message(k, error, sigma), np.zeros(3)) if error is not None
              else (time, None, None) for k, (time, error) in enumerate(zip(TIMES, errors))]
-    rows = autopilot.fly(found, TIMES, PLACES, which, 0)
+    rows = np.array(autopilot.fly(found, TIMES, PLACES, which, 0))
     return rows[:, 1].max(), rows[:, 2].mean()
 
 
@@ -48,6 +51,31 @@ class Autopilot(unittest.TestCase):
         sigmas, metres = largest(errors, 0.1)
         self.assertLess(sigmas, 3)
         self.assertLess(metres, 0.1)
+
+    def test_a_run_is_a_line_of_the_table(self):
+        rows = [(0, 1.0, 0.1, 0.0), (1, 3.5, 0.2, 0.5), (2, 9.0, 0.9, 1.5)]
+        self.assertEqual("run      3     2      1    3.50   0.200     1.50".split(),
+                         autopilot.line("run", rows).split())
+        self.assertEqual("run   no message", autopilot.line("run", []))
+
+    def test_the_driver_reads_the_structs_that_are_written_here(self):
+        path = os.path.join(os.path.dirname(os.environ["TWOVIEW_LIBRARY"]),
+                            "libtwoview_mavlink.so")
+        if not os.path.exists(path):
+            self.skipTest("the library was built without the MAVLink driver")
+        estimator = autopilot.Estimator(path, np.eye(3)[[2, 0, 1]], 0)
+        state = tv.Library(os.environ["TWOVIEW_LIBRARY"]).make(_abi.tv_odometry_state)
+        state.status, state.has_pose, state.has_covariance, state.scale_source = 1, 1, 1, 3
+        state.world_from_cam_R[:] = (0, 0, 1, 1, 0, 0, 0, 1, 0)
+        for k in range(6):
+            state.cam_from_world_covariance[7 * k] = 1e-4
+        estimator.update(state, 1.0, None, True)
+        state.world_from_cam_t[0] = 0.5
+        found = autopilot.Message(estimator.update(state, 1.5, None, True))
+        np.testing.assert_allclose(found.position, (0.5, 0, 0), atol=1e-12)
+        np.testing.assert_allclose(found.velocity, (1, 0, 0), atol=1e-12)
+        drift = 2 * (0.005 * 0.5) ** 2  # two messages in the filter's second
+        np.testing.assert_allclose(np.diag(found.position_covariance), 1e-4 + drift)
 
     def test_a_jump_is_refused_until_the_counter_tells_of_it(self):
         kalman = autopilot.Filter("PX4")

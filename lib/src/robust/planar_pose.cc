@@ -8,16 +8,16 @@
 namespace tv {
 namespace {
 
-// Whether the matches decide against a rival of the outcome's pose, which has num_inliers: of the
-// matches that only one of the two explains, the outcome's are more than chance gives. If each were
-// as likely to be either's, the outcome's would be d more with probability at most
+// Whether the matches decide against a rival of the outcome's pose, which num_inliers matches
+// explain: of those that only one of the two explains, the outcome's are more than chance gives.
+// If each were as likely to be either's, the outcome's would be d more with probability at most
 // exp(-d^2 / (2 n)), n the number of both (the sign test, by Hoeffding's bound of 1963).
 bool matches_decide(const Fit& f, const Pose& rival, int num_inliers) {
-  const int rivals = near_matches(f.matches.pairs, f.matches.pairs.num, rival, f.threshold,
-                                  f.threshold, f.indices);
+  const int num_rivals = near_matches(f.matches.pairs, f.matches.pairs.num, rival, f.threshold,
+                                      f.threshold, f.indices);
   int common = 0;
-  for (int k = 0; k < rivals; ++k) common += f.out->inlier[f.indices[k]] != 0;
-  const double difference = num_inliers - rivals, apart = num_inliers + rivals - 2 * common;
+  for (int k = 0; k < num_rivals; ++k) common += f.out->inlier[f.indices[k]] != 0;
+  const double difference = num_inliers - num_rivals, apart = num_inliers + num_rivals - 2 * common;
   return difference > 0 && difference * difference > -2 * kLogMeaningful * apart;
 }
 

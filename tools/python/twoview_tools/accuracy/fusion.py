@@ -13,7 +13,7 @@ import sys
 import numpy as np
 
 from .. import ROOT
-from ..odometry import cli, flights
+from ..odometry import flights
 
 FIRST = 5  # keyframes that the mean of NEES leaves out: the position is known exactly at first
 COLUMNS = ("mean m", "end m", "sigma m", "NEES", "fused")
@@ -80,18 +80,12 @@ def line(name, noise, values):
 def main(argv=None):
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folders", nargs="*", metavar="FLIGHT", help="folders of rendered flights")
-    parser.add_argument("--flights", type=int, default=0, metavar="N",
-                        help="render and run the flights of the seeds 0 to N-1 (.cache/flights)")
+    flights.add_arguments(parser)
     parser.add_argument("--noise", type=float, nargs="+", default=[0.0], metavar="M_PER_S",
                         help="added to each axis of each velocity (0)")
     parser.add_argument("--draws", type=int, default=5, help="of that noise (%(default)s)")
     arguments = parser.parse_args(argv)
-    folders = arguments.folders + [
-        flights.render(seed, os.path.join(cli.FLIGHT_FOLDER, f"flight_{seed:02d}"))
-        for seed in range(arguments.flights)]
-    if not folders:
-        parser.error("no flight: name folders, or --flights N")
+    folders = flights.chosen(parser, arguments)
     print(f"{'':18}{'velocities alone':>35} {'fused':>35}\n{'flight':<12}noise "
           + " ".join(f"{name:>8}" for name in 2 * COLUMNS[:4]) + "   fused")
     found = {}

@@ -23,7 +23,8 @@ import numpy as np
 import twoview as tv
 from twoview import _abi
 
-from . import cli, faults, flights
+from . import faults, flights
+from .poses import rotations_of
 from .set_writer import SetWriter
 from .sets import DESCRIPTIONS, read_set
 
@@ -67,11 +68,13 @@ class _Estimate(ctypes.Structure):
                 ("velocity_covariance", ctypes.c_double * 36)]
 
 
-def matrix(w, x, y, z):
-    """The rotation of a unit quaternion."""
-    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                     [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                     [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
+def rotation(w, x, y, z):
+    return rotations_of([x, y, z, w])[0]
+
+
+def check(status, call):
+    if status != 0:
+        raise RuntimeError(f"{call} returned {status}")
 
 
 class Tracker(tv.Odometry):
@@ -98,7 +101,8 @@ class Estimator:
         options.weak = weak
         options.body_from_camera[:] = body_from_camera.ravel().tolist()
         self._estimator = ctypes.create_string_buffer(4096)  # more than sizeof(tvm_estimator)
-        assert self._driver.tvm_estimator_init(self._estimator, ctypes.byref(options)) == 0
+        check(self._driver.tvm_estimator_init(self._estimator, ctypes.byref(options)),
+              "tvm_estimator_init")
 
     def update(self, raw, time_s, previous, is_upright):
         track, estimate = _Track(), _Estimate()
@@ -109,8 +113,8 @@ class Estimator:
             track.has_previous = 1
             track.previous_R[:] = previous[0].ravel().tolist()
             track.previous_t[:] = previous[1].tolist()
-        assert self._driver.tvm_estimator_update(self._estimator, ctypes.byref(track),
-                                                 ctypes.byref(estimate)) == 0
+        check(self._driver.tvm_estimator_update(self._estimator, ctypes.byref(track),
+                                                ctypes.byref(estimate)), "tvm_estimator_update")
         return estimate
 
 
@@ -118,7 +122,7 @@ class Message:
     """What an estimate says of a frame: position and velocity along the world's axes."""
 
     def __init__(self, estimate):
-        turn = matrix(*estimate.world_from_body)
+        turn = rotation(*estimate.world_from_body)
         self.reset = estimate.reset_counter
         self.position, self.velocity = np.array(estimate.position_m), turn @ estimate.velocity_m_s
         self.position_covariance = np.reshape(estimate.pose_covariance, (6, 6))[:3, :3]
@@ -133,7 +137,7 @@ def messages(folder, weak=0):
     truth = source.truth()
     with open(os.path.join(folder, "imu.txt"), encoding="ascii") as file:
         lines = [line.split() for line in file if line[0] != "#"]
-    body_from_camera = matrix(*map(float, lines[0][1:]))
+    body_from_camera = rotation(*map(float, lines[0][1:]))
     samples = np.array(lines[1:], float)
     origins, found, last = {}, [], None
     with Tracker(tv.read_camera(os.path.join(folder, "cameras.yaml"))) as odometry:
@@ -141,7 +145,7 @@ def messages(folder, weak=0):
         for time, name in zip(source.times, source.names):
             k = int(np.argmin(abs(samples[:, 0] - time)))
             _, *q, sigma, height, height_sigma, vx, vy, vz, v_sigma = samples[k]
-            attitude = matrix(*q) @ body_from_camera
+            attitude = rotation(*q) @ body_from_camera
             image = cv2.imread(os.path.join(folder, name), cv2.IMREAD_GRAYSCALE)
             state = odometry.track(
                 image, time, world_from_cam=attitude, attitude_sigma_rad=sigma,
@@ -255,7 +259,7 @@ def fly(found, truth_times, truth_places, autopilot, seed):
             error = kalman.x[:3] - (truth_places[k] - origin)
             rows.append((time, np.abs(error / np.sqrt(np.diag(kalman.P)[:3])).max(),
                          np.linalg.norm(error), time - heard))
-    return np.array(rows)
+    return rows
 
 
 def make(kind, source, folder, other):
@@ -273,24 +277,31 @@ def make(kind, source, folder, other):
     return faults.inject(kind, source, folder, other)
 
 
+def line(run, rows):
+    """A run's line of the table."""
+    fed = [row for row in rows if row[3] < 1]
+    if not fed:
+        return f"{run}   no message"
+    sigmas = [row[1] for row in fed]
+    return (f"{run}{len(rows):7d}{len(fed):6d}{sum(value > 3 for value in sigmas):7d}"
+            f"{max(sigmas):8.2f}{max(row[2] for row in fed):8.3f}"
+            f"{max(row[3] for row in rows):9.2f}")
+
+
 def main(argv=None):
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folders", nargs="*", metavar="FLIGHT", help="folders of rendered flights")
-    parser.add_argument("--flights", type=int, default=0, metavar="N",
-                        help="render and run the flights of the seeds 0 to N-1 (.cache/flights)")
+    flights.add_arguments(parser)
     parser.add_argument("--kinds", default=",".join(KINDS), help="faults (%(default)s)")
     parser.add_argument("--seeds", type=int, default=3, help="of the accelerometer (%(default)s)")
     parser.add_argument("--weak", action="store_true", help="weak frames are sent, too")
     arguments = parser.parse_args(argv)
-    folders = arguments.folders + [
-        flights.render(seed, os.path.join(cli.FLIGHT_FOLDER, f"flight_{seed:02d}"))
-        for seed in range(arguments.flights)]
+    folders = flights.chosen(parser, arguments)
     print(f"{'flight':10}{'fault':12}{'autopilot':11}{'frames':>7}{'fed':>6}{'astray':>7}"
           f"{'sigmas':>8}{'metres':>8}{'silent s':>9}")
     with tempfile.TemporaryDirectory() as scratch:
         for n, folder in enumerate(folders):
-            truth = read_set(folder).truth()
+            name, truth = os.path.basename(os.path.normpath(folder)), read_set(folder).truth()
             for kind in arguments.kinds.split(","):
                 made = make(kind, folder, os.path.join(scratch, kind),
                             folders[(n + 1) % len(folders)])
@@ -298,12 +309,7 @@ def main(argv=None):
                 for autopilot in AUTOPILOTS:
                     for seed in range(arguments.seeds):
                         rows = fly(found, truth.times, truth.positions, autopilot, seed)
-                        fed = rows[rows[:, 3] < 1] if len(rows) else np.zeros((0, 4))
-                        run = f"{os.path.basename(folder):10}{kind:12}{autopilot:11}"
-                        if not len(fed):
-                            astray = int((fed[:, 1] > 3).sum())
-                        print(f"{run}{len(rows):7d}{len(fed):6d}{astray:7d}{fed[:, 1].max():8.2f}"
-                              f"{fed[:, 2].max():8.3f}{rows[:, 3].max():9.2f}", flush=True)
+                        print(line(f"{name:10}{kind:12}{autopilot:11}", rows), flush=True)
 
 
 if __name__ == "__main__":

@@ -8,11 +8,9 @@ import shutil
 import sys
 import tempfile
 
-from .. import ROOT
 from . import (copies, endurance, evaluate, faults, flights, instructions, mapper, no_camera,
                orbslam, poses, runs, sensors, sets, tables, targets, tour)
 
-FLIGHT_FOLDER = os.path.join(ROOT, ".cache", "flights")
 # The sources that faults are put into: one real and quick, one rendered; and what other_room shows.
 FAULT_SET, OTHER_SET = "seq_tsukuba", "seq_icl_of_kt3"
 
@@ -77,15 +75,14 @@ def sources_of(arguments, scratch):
                 if not arguments.keep:  # all of them take gigabytes
                     shutil.rmtree(folder)
     for seed in range(arguments.flights):
-        name = f"flight_{seed:02d}"
-        yield "flight", name, flights.render(seed, os.path.join(FLIGHT_FOLDER, name))
+        yield "flight", f"flight_{seed:02d}", flights.flight(seed)
     for seed in range(max(arguments.half_turns, int(arguments.faults))):
         name = f"half_turn_{seed:02d}"
-        yield "fault", name, flights.render(seed, os.path.join(FLIGHT_FOLDER, name),
+        yield "fault", name, flights.render(seed, os.path.join(flights.FOLDER, name),
                                             ["--half-turn"])
     for seed in range(arguments.sensors):
         name = f"flight_{seed:02d}"
-        flight = flights.render(seed, os.path.join(FLIGHT_FOLDER, name))
+        flight = flights.flight(seed)
         for kind in sensors.KINDS:
             label = f"{name}+{kind}"
             yield "sensors", label, sensors.make(kind, flight,
@@ -94,7 +91,7 @@ def sources_of(arguments, scratch):
         return
     chosen = sets.set_paths(arguments.fault_sources or FAULT_SET)
     if not arguments.fault_sources:
-        chosen.append(flights.render(0, os.path.join(FLIGHT_FOLDER, "flight_00")))
+        chosen.append(flights.flight(0))
     other = sets.set_paths(OTHER_SET)[0]
     for path in chosen:
         for kind in faults.KINDS:
@@ -142,7 +139,7 @@ def more_figures(arguments, runs_of, scratch):
                                            os.path.join(scratch, "colmap", run["label"]))
             yield mapper.sentence(run["label"], run["colmap"], run["cpu_s"], run["num_frames"])
     if arguments.endurance:
-        flight = flights.render(0, os.path.join(FLIGHT_FOLDER, "flight_00"))
+        flight = flights.flight(0)
         folder = endurance.repeat(flight, os.path.join(scratch, "endurance"), arguments.endurance)
         print("twoview: endurance", file=sys.stderr, flush=True)
         again = [one_run("twoview", "endurance", "endurance", folder,

@@ -9,6 +9,7 @@ import subprocess
 from .. import ROOT
 
 SOURCES = ("flights", "room")  # folders of tools/
+FOLDER = os.path.join(ROOT, ".cache", "flights")  # of flights that are rendered once
 FILMER = os.path.join(ROOT, "build", "release", "bin", "twoview_flights")
 
 
@@ -48,3 +49,23 @@ def render(seed, folder, options=()):
     shutil.rmtree(folder, ignore_errors=True)
     os.rename(unfinished, folder)
     return folder
+
+
+def flight(seed):
+    """The folder of a seed's flight in FOLDER; rendered where it is not there."""
+    return render(seed, os.path.join(FOLDER, f"flight_{seed:02d}"))
+
+
+def add_arguments(parser):
+    """The flights that a laboratory's program runs, which chosen() returns."""
+    parser.add_argument("folders", nargs="*", metavar="FLIGHT", help="folders of rendered flights")
+    parser.add_argument("--flights", type=int, default=0, metavar="N",
+                        help="render and run the flights of the seeds 0 to N-1 (.cache/flights)")
+
+
+def chosen(parser, arguments):
+    """The folders; without one, the parser's error."""
+    folders = arguments.folders + [flight(seed) for seed in range(arguments.flights)]
+    if not folders:
+        parser.error("no flight: name folders, or --flights N")
+    return folders

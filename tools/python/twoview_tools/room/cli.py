@@ -14,7 +14,6 @@ from .. import ROOT
 from ..odometry import flights, poses, sets, surfaces
 from . import flight, model, peer, photometric, plan, tape, truth
 
-FLIGHT_FOLDER = os.path.join(ROOT, ".cache", "flights")
 PROGRAM = os.path.join(ROOT, "build", "release", "bin", "twoview")
 WITHIN = 0.05  # metres: what precision and recall count as right
 
@@ -144,7 +143,7 @@ def main(argv=None):
           f"(within {100 * WITHIN:g} cm; ms a keyframe, of CPU; mesh in all)")
     rows = []
     for seed in range(arguments.first, arguments.first + arguments.flights):
-        folder = flights.render(seed, os.path.join(FLIGHT_FOLDER, f"flight_{seed:02d}"))
+        folder = flights.flight(seed)
         with tempfile.TemporaryDirectory() as out:
             run = subprocess.run([PROGRAM, "odometry", folder, "-o", out, "--quiet"], check=False)
             if run.returncode != 0:
