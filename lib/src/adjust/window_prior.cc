@@ -72,11 +72,8 @@ void rotation_vector(const double R[9], double w[3], double jacobian[9]) {
 
 WindowPose stepped(const WindowPose& pose, const double step[6]) {
   const Mat3 turn = rotation_step(vector(step));
-  Mat3 R;
-  std::copy_n(pose.R, 9, R.data());
-  R = orthonormal_product(turn, R);
   WindowPose result;
-  std::copy_n(R.data(), 9, result.R);
+  write_matrix(orthonormal_product(turn, matrix_of(pose.R)), result.R);
   multiply(turn.data(), pose.t, result.t);
   for (int i = 0; i < 3; ++i) result.t[i] += step[3 + i];
   set_centre(&result);

@@ -2,6 +2,7 @@
 // results.
 #include "twoview/camera.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <limits>
 
@@ -83,9 +84,7 @@ tv_status tv_camera_project(const tv_camera *camera, const double point[3], doub
   if (jacobian && !tv::all_finite(d_pixel.data(), 6)) return TV_ERR_OUTSIDE;
   pixel[0] = projected[0];
   pixel[1] = projected[1];
-  if (jacobian) {
-    for (int i = 0; i < 6; ++i) jacobian[i] = d_pixel(i / 3, i % 3);
-  }
+  if (jacobian) std::copy_n(d_pixel.data(), 6, jacobian);
   return TV_OK;
 }
 

@@ -73,8 +73,8 @@ tv_status read_view(const tv_room* room, const tv_depth_map* map, RoomView* view
   if (!all_finite(R, 9) || !all_finite(t, 3)) return TV_ERR_NOT_FINITE;
   if (!is_rotation(R)) return TV_ERR_ARGUMENT;
   view->camera = prepare_camera(*given.camera);
-  for (int i = 0; i < 9; ++i) view->rotation(i / 3, i % 3) = R[i];
-  for (int i = 0; i < 3; ++i) view->centre[i] = t[i];
+  view->rotation = matrix_of(R);
+  view->centre = Vec3(t);
   return TV_OK;
 }
 

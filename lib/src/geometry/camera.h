@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>  // for cross() of two Vec3
+#include <algorithm>
 
 #include "twoview/camera.h"
 
@@ -14,6 +15,10 @@ using Vec3 = Eigen::Matrix<double, 3, 1>;
 using Mat3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;  // row-major, as in the C API
 using Mat23 = Eigen::Matrix<double, 2, 3, Eigen::RowMajor>;
 using Mat32 = Eigen::Matrix<double, 3, 2>;
+
+// A matrix and the nine numbers of the C API, row by row.
+inline Mat3 matrix_of(const double entries[9]) { return Eigen::Map<const Mat3>(entries); }
+inline void write_matrix(const Mat3& M, double entries[9]) { std::copy_n(M.data(), 9, entries); }
 
 // A checked camera with the bounds of its valid region, which prepare_camera computes once.
 struct Camera {

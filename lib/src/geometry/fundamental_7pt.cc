@@ -13,11 +13,7 @@ int fundamental_7pt(const Vec3 rays0[7], const Vec3 rays1[7], Mat3 models[3]) {
     epipolar_row(rays0[k].normalized(), rays1[k].normalized(), rows[k]);
   }
   if (!null_space(rows, 7, basis)) return 0;
-  Mat3 A, B;
-  for (int i = 0; i < 9; ++i) {
-    A(i / 3, i % 3) = basis[0][i];
-    B(i / 3, i % 3) = basis[1][i];
-  }
+  const Mat3 A = matrix_of(basis[0]), B = matrix_of(basis[1]);
   // det(A + x B) = det A + x tr(adj(A) B) + x^2 tr(adj(B) A) + x^3 det B; the columns' triple
   // products give each term.
   const Vec3 a0 = A.col(0), a1 = A.col(1), a2 = A.col(2);

@@ -45,9 +45,8 @@ bool fundamental_8pt(const Vec3 rays0[8], const Vec3 rays1[8], Mat3* M) {
     epipolar_row((T0 * rays0[k]).normalized(), (T1 * rays1[k]).normalized(), rows[k]);
   }
   if (!null_space(rows, 8, basis)) return false;
-  Mat3 full, normalised;
-  for (int i = 0; i < 9; ++i) full(i / 3, i % 3) = basis[0][i];
-  if (!nearest_rank2(full, &normalised)) return false;
+  Mat3 normalised;
+  if (!nearest_rank2(matrix_of(basis[0]), &normalised)) return false;
   *M = T1.transpose() * normalised * T0;
   const double norm = M->norm();
   if (!(norm > 1e-300) || !(norm < 1e300)) return false;

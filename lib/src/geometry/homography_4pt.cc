@@ -20,7 +20,7 @@ bool homography_4pt(const Vec3 rays0[4], const Vec3 rays1[4], Mat3* H) {
     epipolar_row(f0, other, rows[2 * k + 1]);
   }
   if (!null_space(rows, 8, basis)) return false;
-  for (int i = 0; i < 9; ++i) (*H)(i / 3, i % 3) = basis[0][i];
+  *H = matrix_of(basis[0]);
   int positive = 0;
   for (int k = 0; k < 4; ++k) positive += rays1[k].dot(*H * rays0[k]) > 0;
   if (positive == 0) *H = -*H;

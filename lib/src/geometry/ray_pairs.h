@@ -86,7 +86,7 @@ struct KernelModel {
 };
 inline KernelModel kernel_model(const Mat3& M) {
   KernelModel model;
-  for (int k = 0; k < 9; ++k) model.m[k] = M(k / 3, k % 3);
+  write_matrix(M, model.m);
   return model;
 }
 

@@ -134,18 +134,15 @@ void pose_squares(const RayPairs& pairs, int first, int count, const Pose& pose,
   for (int k = 0; k < 18; ++k) arrays[k] = rays.p[k];
   arrays[18] = pairs.pixel_angle;
   double entries[21];
-  const Mat3 E = essential_from_pose(pose);
-  for (int k = 0; k < 9; ++k) {
-    entries[k] = E(k / 3, k % 3);
-    entries[9 + k] = pose.R(k / 3, k % 3);
-  }
+  write_matrix(essential_from_pose(pose), entries);
+  write_matrix(pose.R, entries + 9);
   for (int k = 0; k < 3; ++k) entries[18 + k] = pose.t[k];
   pairs.kernels->pose_squares(arrays, first, count, pairs.on_plane, entries, scale_px, squares);
 }
 
 int64_t msac_cost_fast(const RayPairs& pairs, const Mat3& M, double threshold_px, int64_t bound) {
   float m[9];
-  for (int k = 0; k < 9; ++k) m[k] = static_cast<float>(M(k / 3, k % 3));
+  for (int k = 0; k < 9; ++k) m[k] = static_cast<float>(M.data()[k]);
   const double inverse = 1 / (threshold_px * threshold_px);
   const float inverse_sq = static_cast<float>(inverse < 1e37 ? inverse : 1e37);
   const int num_blocks = static_cast<int>(padded_to_blocks(pairs.num)) / kScoreBlock;

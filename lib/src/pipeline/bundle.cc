@@ -12,8 +12,7 @@ Motion read_motion(const tv_camera_pair& pair) {
   const double length = std::sqrt(x * x + y * y + z * z);
   Motion motion;
   motion.baseline = largest * length;
-  motion.pose.t = Vec3(x / length, y / length, z / length);
-  for (int i = 0; i < 9; ++i) motion.pose.R(i / 3, i % 3) = pair.cam1_from_cam0_R[i];
+  motion.pose = {matrix_of(pair.cam1_from_cam0_R), Vec3(x / length, y / length, z / length)};
   return motion;
 }
 
@@ -28,7 +27,7 @@ void adjust_pair(tv_context* context, const tv_pixel_pairs& pixels,
                               options};
   adjust_two_view(problem, motion.pose, motion.baseline, context->arena, points, outcome);
   if (!outcome->moved) return;  // R and t keep their bits
-  for (int i = 0; i < 9; ++i) pair->cam1_from_cam0_R[i] = outcome->pose.R(i / 3, i % 3);
+  write_matrix(outcome->pose.R, pair->cam1_from_cam0_R);
   for (int i = 0; i < 3; ++i) pair->cam1_from_cam0_t[i] = motion.baseline * outcome->pose.t[i];
 }
 

@@ -20,14 +20,12 @@ size_t densify_bytes(const tv_camera& camera0, const tv_camera& camera1,
 int32_t densify(const tv_camera_pair& pair, const tv_image images[2],
                 const tv_dense_options& options, Arena& arena, tv_dense_point* points,
                 int32_t cap_points) {
-  Mat3 rotation;
-  for (int i = 0; i < 9; ++i) rotation(i / 3, i % 3) = pair.cam1_from_cam0_R[i];
-  const double* const t = pair.cam1_from_cam0_t;
   const ParallaxHint hint{options.min_parallax_rad, options.max_parallax_rad, options.sparse,
                           options.num_sparse};
   DensePair matched;
-  if (!match_pair(pair.camera0, pair.camera1, images[0], images[1], rotation,
-                  Vec3(t[0], t[1], t[2]), hint, limits_of(options), arena, &matched)) {
+  if (!match_pair(pair.camera0, pair.camera1, images[0], images[1],
+                  matrix_of(pair.cam1_from_cam0_R), Vec3(pair.cam1_from_cam0_t), hint,
+                  limits_of(options), arena, &matched)) {
     return 0;
   }
   return make_points(matched, images[0], options.max_relative_sigma, arena, points,

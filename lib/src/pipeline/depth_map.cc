@@ -36,11 +36,7 @@ double field_of(const Camera& lens, bool across) {
   return std::min(most / of_pinhole, kMost);
 }
 
-Mat3 rotation_of(const tv_depth_view& view) {
-  Mat3 R;
-  for (int i = 0; i < 9; ++i) R(i / 3, i % 3) = view.world_from_cam_R[i];
-  return R;
-}
+Mat3 rotation_of(const tv_depth_view& view) { return matrix_of(view.world_from_cam_R); }
 
 // R0' R1 for two rotations, row by row in a fixed order.
 Mat3 transposed_times(const Mat3& a, const Mat3& b) {

@@ -11,10 +11,6 @@
 namespace tv {
 namespace {
 
-void store(const Mat3& m, double out[9]) {
-  for (int k = 0; k < 9; ++k) out[k] = m(k / 3, k % 3);
-}
-
 // The inverse pose, R' and -R' t. The written order of operations gives the bits that are promised
 // for exchanged views.
 Pose inverse_pose(const Pose& pose) {
@@ -65,7 +61,7 @@ void write_pose(const PairEstimate& estimate, tv_two_view* result) {
   for (int k = 0; k < 3; ++k) result->t[k] = swapped ? inverse.t[k] : pose.t[k];
   const Mat3 E = essential_from_pose(pose).normalized();
   result->has_E = 1;
-  store(swapped ? Mat3(E.transpose()) : E, result->E);
+  write_matrix(swapped ? Mat3(E.transpose()) : E, result->E);
   result->has_covariance = outcome.has_covariance;
   if (outcome.has_covariance) {
     write_covariance(pose, inverse, outcome.covariance, swapped, result->covariance);
@@ -73,7 +69,7 @@ void write_pose(const PairEstimate& estimate, tv_two_view* result) {
   if (!outcome.evidence->has_alternative) return;
   const Pose other = swapped ? inverse_pose(outcome.alternative) : outcome.alternative;
   result->has_alternative = 1;
-  store(other.R, result->alternative_R);
+  write_matrix(other.R, result->alternative_R);
   for (int k = 0; k < 3; ++k) result->alternative_t[k] = other.t[k];
   result->has_alternative_covariance = outcome.has_alternative_covariance;
   if (outcome.has_alternative_covariance) {
@@ -91,13 +87,13 @@ void write_matrices(const PairEstimate& estimate, tv_two_view* result) {
     const Mat3 inverse1 = inverse_intrinsics(matches.intrinsics[1]);
     const Mat3 F = (inverse1.transpose() * outcome.epipolar.M * inverse0).normalized();
     result->has_F = 1;
-    store(estimate.swapped ? Mat3(F.transpose()) : F, result->F);
+    write_matrix(estimate.swapped ? Mat3(F.transpose()) : F, result->F);
   }
   if (outcome.has_H) {
     const Mat3 forward = matches.intrinsics[1] * outcome.H * inverse0;
     Mat3 H = estimate.swapped ? adjugate(forward) : forward;
     result->has_H = scale_homography(&H);
-    if (result->has_H) store(H, result->H);
+    if (result->has_H) write_matrix(H, result->H);
   }
 }
 
@@ -130,7 +126,7 @@ void write_estimate(const PairEstimate& estimate, tv_two_view* result) {
   const Mat3& R = outcome.epipolar.pose.R;
   r.has_R = outcome.has_R;
   r.has_t = outcome.has_t;
-  if (outcome.has_R) store(estimate.swapped ? Mat3(R.transpose()) : R, r.R);
+  if (outcome.has_R) write_matrix(estimate.swapped ? Mat3(R.transpose()) : R, r.R);
   if (outcome.has_t) write_pose(estimate, result);
   write_matrices(estimate, result);
 }

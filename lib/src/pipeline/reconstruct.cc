@@ -126,10 +126,7 @@ void triangulate_inliers(tv_context* context, const PairTask& task, const Attemp
   }
 }
 
-void store_unit(const Mat3& m, double out[9]) {
-  const Mat3 unit = m.normalized();
-  for (int k = 0; k < 9; ++k) out[k] = unit(k / 3, k % 3);
-}
+void write_unit(const Mat3& m, double out[9]) { write_matrix(m.normalized(), out); }
 
 // Adjusts pose and points together, and computes E and F anew. The covariance that was judged stays
 // that of the pose: the adjustment's own is of independent noise and exact cameras.
@@ -141,12 +138,10 @@ void adjust(tv_context* context, const PairTask& task, PairArrays& arrays, tv_tw
   if (!outcome.moved) return;
   std::copy(pair.cam1_from_cam0_R, pair.cam1_from_cam0_R + 9, two_view->R);
   std::copy(pair.cam1_from_cam0_t, pair.cam1_from_cam0_t + 3, two_view->t);
-  Pose pose;
-  for (int k = 0; k < 9; ++k) pose.R(k / 3, k % 3) = two_view->R[k];
-  for (int k = 0; k < 3; ++k) pose.t[k] = two_view->t[k];
+  const Pose pose = {matrix_of(two_view->R), Vec3(two_view->t)};
   const Mat3 E = essential_from_pose(pose);
-  store_unit(E, two_view->E);
-  store_unit(inverse_intrinsics(intrinsics_of(pair.camera1)).transpose() * E *
+  write_unit(E, two_view->E);
+  write_unit(inverse_intrinsics(intrinsics_of(pair.camera1)).transpose() * E *
                  inverse_intrinsics(intrinsics_of(pair.camera0)),
              two_view->F);
   if (!two_view->has_covariance) return;

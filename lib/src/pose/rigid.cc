@@ -81,9 +81,7 @@ bool are_near(const Rigid& cam0_from_world, const Rigid& cam1_from_world, double
 
 Rigid orthonormalised(const Rigid& rigid) {
   Rigid result = rigid;
-  Mat3 R;
-  std::copy_n(rigid.R, 9, R.data());
-  std::copy_n(orthonormalised(R).data(), 9, result.R);
+  write_matrix(orthonormalised(matrix_of(rigid.R)), result.R);
   return result;
 }
 
@@ -94,7 +92,7 @@ Rigid scaled_motion(const Rigid& rigid, double factor) {
   Rigid result = kIdentity;
   if (length > 1e-12) {
     axis /= length;
-    std::copy_n(rotation_about(axis, factor * rotation_angle(rigid)).data(), 9, result.R);
+    write_matrix(rotation_about(axis, factor * rotation_angle(rigid)), result.R);
   }
   for (int k = 0; k < 3; ++k) result.t[k] = factor * rigid.t[k];
   return result;

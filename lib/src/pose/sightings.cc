@@ -159,13 +159,13 @@ void unit_ray(const Sighting& s, double ray[3]) {
 void write_pose(const Sightings& s, const Pose& pose, double R[9], double t[3]) {
   double turned[3];
   rotate(pose.R, s.centre, turned);
-  std::copy_n(pose.R.data(), 9, R);
+  write_matrix(pose.R, R);
   for (int k = 0; k < 3; ++k) t[k] = pose.t[k] / s.scale - turned[k];
 }
 
 Pose read_pose(const Sightings& s, const double R[9], const double t[3]) {
   Pose pose;
-  std::copy_n(R, 9, pose.R.data());
+  pose.R = matrix_of(R);
   double turned[3];
   rotate(pose.R, s.centre, turned);
   for (int k = 0; k < 3; ++k) pose.t[k] = (t[k] + turned[k]) * s.scale;

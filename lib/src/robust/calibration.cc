@@ -69,7 +69,7 @@ void calibration_equations(const PoseRefiner& f, int count, const Pose& pose,
   for (int q = 0; q < kAll; ++q) {
     for (int p = 0; p < kPose; ++p) {
       double sum = 0;
-      for (int c = 0; c < 9; ++c) sum += with_entries[q][c] * columns[p](c / 3, c % 3);
+      for (int c = 0; c < 9; ++c) sum += with_entries[q][c] * columns[p].data()[c];
       e.with_pose[q][p] = sum;
     }
   }

@@ -84,7 +84,7 @@ void sum_equations(const PoseRefiner& f, int count, const Pose& pose, const Robu
     double slopes[kAll];
     for (int p = 0; p < kPose; ++p) {
       slopes[p] = 0;
-      for (int c = 0; c < 9; ++c) slopes[p] += s.by_entry[c] * columns[p](c / 3, c % 3);
+      for (int c = 0; c < 9; ++c) slopes[p] += s.by_entry[c] * columns[p].data()[c];
     }
     for (int v = 0; v < 2; ++v) {
       const tv_camera& camera = cameras[v].model;

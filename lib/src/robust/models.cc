@@ -95,7 +95,7 @@ double HomographyModel::normal_equations(const RayPairs& pairs, const int32_t* i
 
 HomographyModel HomographyModel::stepped(const double* step) const {
   HomographyModel result;
-  for (int k = 0; k < 9; ++k) result.H(k / 3, k % 3) = H(k / 3, k % 3) + step[k];
+  result.H = H + matrix_of(step);
   result.H /= result.H.norm();
   return result;
 }

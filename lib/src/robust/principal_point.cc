@@ -58,7 +58,7 @@ void shifted_equations(const TwoViewProblem& problem, const Matches& matches,
     for (int c = k; c < 2; ++c) upper[row_of(kPose + k) + c - k] += with_point[k + c];
     for (int p = 0; p < kPose; ++p) {
       double sum = 0;
-      for (int e = 0; e < 9; ++e) sum += with_entries[k][e] * columns[p](e / 3, e % 3);
+      for (int e = 0; e < 9; ++e) sum += with_entries[k][e] * columns[p].data()[e];
       upper[row_of(p) + kPose + k - p] = sum;
     }
   }

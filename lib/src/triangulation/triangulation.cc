@@ -141,7 +141,7 @@ tvk_triangulate_pair kernel_pair(const TriangulationPair& pair) {
       p.principal[2 * v + k] = principal[k];
     }
   }
-  for (int k = 0; k < 9; ++k) p.R[k] = pair.cam1_from_cam0_R(k / 3, k % 3);
+  write_matrix(pair.cam1_from_cam0_R, p.R);
   for (int k = 0; k < 3; ++k) {
     p.direction[k] = pair.direction[k];
     p.center1[k] = pair.center1[k];
@@ -205,10 +205,8 @@ TriangulationPair prepare_triangulation(const Camera& camera0, const Camera& cam
 
 TriangulationPair prepare_triangulation(const Camera& camera0, const Camera& camera1,
                                         const tv_camera_pair& pair) {
-  const double *const R = pair.cam1_from_cam0_R, *const t = pair.cam1_from_cam0_t;
-  Mat3 rotation;
-  for (int i = 0; i < 9; ++i) rotation(i / 3, i % 3) = R[i];
-  return prepare_triangulation(camera0, camera1, rotation, Vec3(t[0], t[1], t[2]));
+  return prepare_triangulation(camera0, camera1, matrix_of(pair.cam1_from_cam0_R),
+                               Vec3(pair.cam1_from_cam0_t));
 }
 
 Correction correct_match(tv_triangulation method, const TriangulationPair& pair,
