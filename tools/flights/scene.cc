@@ -96,7 +96,8 @@ float Surface::sample(float u, float v, float footprint) const {
   const auto at = [&](int k) {
     const Level& l = levels_[static_cast<size_t>(k)];
     const float scale = 1 / (texel * static_cast<float>(1 << k));
-    // The texels of level 0 lie on the corners of the side, those of the others between them.
+    // The texels of level 0 lie at the corners of the side; a texel of a higher level lies in the
+    // middle of those of level 0 that it is the mean of.
     const float offset = 0.5f - 0.5f / static_cast<float>(1 << k);
     return bilinear(l.texels.data(), l.columns, l.rows, u * scale - offset, v * scale - offset);
   };

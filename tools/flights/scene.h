@@ -56,9 +56,9 @@ class Scene {
 
   const std::vector<Box>& boxes() const { return boxes_; }
 
-  // Renders linear grey levels, row by row, as a pinhole of infinitely short exposure would see
-  // them. A side that borders on another one in a pixel is sampled four times. `depth` may be null;
-  // otherwise it receives z in the camera frame, metres.
+  // Renders grey levels that are proportional to the light, row by row, as a pinhole camera without
+  // motion blur sees them. A pixel in which two sides of boxes meet is sampled four times. `depth`
+  // may be null; otherwise it receives z in the camera frame, metres.
   void render(const Eye& eye, const CameraPose& pose, float* grey, float* depth = nullptr) const;
 
   // The height above the floor or furniture below, as an ultrasound altimeter measures it, metres.

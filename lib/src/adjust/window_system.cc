@@ -53,8 +53,9 @@ double distance_sq(const double a[3], const double b[3]) {
   return dot(d, d);
 }
 
-// The squared distance from the first view that sees the point up to which the point may go, or any
-// larger number than enough_sq if it is larger: mostly the last view alone shows that.
+// The squared distance from the first view that sees the point up to which the point may go:
+// kFarthest times the longest baseline to another view that sees it, squared. The search ends at
+// the first baseline that allows more than enough_sq, which is mostly that of the last view.
 double farthest_sq(const Window& window, const WindowPose* pose, const WindowPoint& point,
                    double enough_sq) {
   const WindowObservation* observations = window.observations;
@@ -140,8 +141,8 @@ void eliminate(const Window& window, const WindowPose* pose, const WindowPoint& 
   out->along = damping * along;
   damp(ray, scale, out->across, out->along, sums);
   factorise(*sums, diagonal, out);
-  // Of a far point that would move farther away the depth is held, so that the gain of this is not
-  // expected.
+  // The depth of a point that is far away and would move farther is held, so that the predicted
+  // gain does not contain the gain of that move.
   if (!(damping > 0.0 && along < kHardlyKnown * trace && is_far(window, pose, point, ray))) return;
   double step[3];
   solve_point(*out, out->y, step);
@@ -181,7 +182,8 @@ double add_point(const Window& window, const Weighing& weighing, int p) {
     --point.careful;
     curvature.bend = 0.0;
   }
-  // Long before it is added to: the CPU cannot load a vector that was just stored in parts.
+  // Z is cleared long before its entries are added to, because the CPU cannot forward entries that
+  // were just stored one by one to the load of a whole vector.
   Pair* Z = window.Z + 3 * kBlockPairs * point.begin;
   double* columns = reinterpret_cast<double*>(Z);
   std::memset(columns, 0, sizeof(double) * 3 * static_cast<size_t>(pitch));

@@ -39,7 +39,8 @@ struct Window {
   const tv_window_options& options;
   int num_points = 0, num_observations = 0;
   WindowObservation* observations;  // by point, view, and index
-  // For each observation's place: the block of the point's k-th adjusted view.
+  // Place p + k, where p is the place of a point's first observation, holds the block of the k-th
+  // adjusted view that sees the point.
   int32_t* slot_block;
   WindowPoint* points;
   double* position;  // 3 for each point that takes part
@@ -51,7 +52,8 @@ struct Window {
   Pair* Z;  // L^-1 W', 9 for each observation: a point's have three rows of its slots
   EliminatedPoint* eliminated;
   BlockMatrix system;
-  // Of `system`, and half the gradient of the cost, reduced by the points.
+  // Points to the entries of `system`, and holds half the gradient of the cost, both after the
+  // points are eliminated.
   tvk_reduced_system reduced;
   double* step;
 };

@@ -33,7 +33,7 @@ tv_status read_sized(const Struct* object, Struct* checked) {
   return read_sized(object, sizeof(Struct), checked);
 }
 
-// Writes an output as far as its struct_size reaches, and keeps this struct_size.
+// Writes as much of an output as the caller's struct_size covers, and leaves struct_size as it is.
 void write_sized(const void* packed, size_t known_size, void* object);
 
 template <typename Struct>

@@ -5,9 +5,9 @@
 
 namespace tv {
 
-// A rigid motion x -> R x + t, as the estimators calculate with it: cam1_from_cam0 of a pair, with t
-// of length 1, or cam_from_world of a camera before known points, with t in their unit. What is kept
-// is a Rigid (pose/rigid.h); docs/decisions/0013-footprint.md says why there are both.
+// A rigid motion x -> R x + t, as the estimators calculate with it: cam1_from_cam0 of a pair, with
+// t of length 1, or cam_from_world of a camera before known points, with t in their unit. What is
+// kept is a Rigid (pose/rigid.h); docs/decisions/0013-footprint.md says why there are both.
 struct Pose {
   Mat3 R = Mat3::Identity();
   Vec3 t = Vec3::Zero();

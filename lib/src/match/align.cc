@@ -61,7 +61,8 @@ bool is_inside(const tv_image& image, double x, double y, const Linear& map, int
          y + reach_y <= image.height - 1 && reach_x < kMostReach && reach_y < kMostReach;
 }
 
-// The window that stays, and the normal equations of the differences from it.
+// The patch around the keypoint in image 0, which stays where it is, and the normal equations of
+// the squared differences between it and the patch in image 1.
 struct Template {
   int16_t channels[TVK_WINDOW_CHANNELS * TVK_WINDOW_SAMPLES];  // kernels.h
   // Weighted sums of products of the constant (1) and the window (w).
@@ -114,7 +115,7 @@ bool make_template(const tvk_align_table& kernels, const tv_image& image, double
   return true;
 }
 
-// Both loops are unrolled: their few turns would take twice as long.
+// Both loops are unrolled: as loops of so few turns they take twice as long.
 void solve(const double factor[kParameters][kParameters], double x[kParameters]) {
 #pragma GCC unroll 6
   for (int c = 0; c < kParameters - 1; ++c) {

@@ -92,7 +92,8 @@ float order_keypoints(const tv_keypoint* keypoints, int32_t num, void* scratch, 
   return side;
 }
 
-// A descriptor, the side that it is compared with, and its list.
+// A descriptor, the descriptors of the other image that it is compared with, and the list of its
+// nearest groups.
 struct Query {
   const tvk_match_table* kernels;
   const uint8_t* descriptor;
@@ -136,7 +137,8 @@ struct Group {
   int32_t count, ranks[kMostMembers], dists[kMostMembers];
 };
 
-// Measures the other members of the group of that rank.
+// Computes the distances to the other members of the group that the descriptor of this rank belongs
+// to.
 void measure(const Query& query, int32_t rank, Group* group) {
   const Side& side = *query.side;
   int32_t indices[kMostMembers];
@@ -275,8 +277,8 @@ bool match_row(const tvk_match_table& kernels, const Side sides[2], const tvk_ne
   const double most = kAbove * options.ratio * options.ratio;
   const int32_t from[2] = {j, i};
   int32_t second = kNone;
-  // `second` is the distance of some second neighbour, so that a match that fails with it fails
-  // with the nearest one, too.
+  // `second` is the distance of one of the second neighbours, not always of the nearest one; a
+  // match that fails the ratio test with it also fails with the nearest one.
   for (int v = 0; v < 2; ++v) {
     if (v == 1) {
       const int32_t back = nearest_of(queries[1], &group);

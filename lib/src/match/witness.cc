@@ -1,5 +1,5 @@
-// Greedy, from the most precise match on: a match stays unless one that stays is of its place. The
-// matches that stay are found by a hash of the cell of their keypoint in image 0. Test:
+// Greedy, from the most precise match on: a match is kept unless one that was kept before is of the
+// same place. Kept matches are found through a hash of the cell of their keypoint in image 0. Test:
 // test/unit/test_witness.cc.
 #include "match/witness.h"
 

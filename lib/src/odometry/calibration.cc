@@ -43,7 +43,7 @@ Rigid move_principal_point(Odometry* odometry, const double to[2], const double 
   model.cx = to[0];
   model.cy = to[1];
   odometry->camera = prepare_camera(model);
-  // It takes the ray (0, 0, 1) to where its pixel is seen now.
+  // The rotation that turns the ray (0, 0, 1) to the ray that now passes through its old pixel.
   const double x = (from[0] - to[0]) / model.fx, y = (from[1] - to[1]) / model.fy;
   const Rigid turn = orthonormalised({{1, 0, x, 0, 1, y, -x, -y, 1}, {0, 0, 0}});
   const Map& map = odometry->map;
@@ -63,7 +63,8 @@ void correct_camera(Odometry* odometry, Frame* frame) {
   const double shift[2] = {(W[2] * e->product[0] - W[1] * e->product[1]) / det,
                            (W[0] * e->product[1] - W[1] * e->product[0]) / det};
   const double gain = shift[0] * e->product[0] + shift[1] * e->product[1];
-  // The mean of a pair's chi-square by degree of freedom, against the place that they agree on.
+  // The chi-square of the pairs' principal points about their common estimate, divided by its
+  // degrees of freedom.
   const double scatter = std::max((e->square - gain) / (2 * (e->num_pairs - 1)), 1.0);
   // Many pairs make a small bias of all of them significant: each must gain as much as its noise.
   const double least = std::max(kLeastGain, static_cast<double>(e->num_pairs));

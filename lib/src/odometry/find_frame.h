@@ -6,7 +6,7 @@
 
 namespace tv {
 
-// Each of these returns whether the frame has its pose then.
+// Each of the functions below returns whether it has found the frame's pose.
 
 // Looks for the points around the reference keyframe where the motion of the frames before predicts
 // them; after a gap, where the frame before saw them.

@@ -19,7 +19,7 @@ struct FrameMatches {
   tv_absolute_pose_options options;
 };
 
-// False: they are too few for a pose.
+// Returns false where the matches are too few for a pose.
 bool gather_matches(Odometry* odometry, double max_error_px, const Frame& frame,
                     FrameMatches* matches) {
   Arena& arena = odometry->scratch;

@@ -39,10 +39,10 @@ int32_t list_points(Odometry* odometry, int32_t keyframe, int32_t* points);
 // Lists the points around the keyframe that are looked for in the next frames.
 void list_local_points(Odometry* odometry, int32_t keyframe);
 
-// The frame takes the pose and the points of the keyframe that was made of it.
+// Gives the frame the pose and the points of the keyframe that was made from it.
 void take_keyframe(const Odometry& odometry, int32_t keyframe, Frame* frame);
 
-// Takes the median depth of the points that the frame sees as that of the scene.
+// Sets the depth of the scene to the median depth of the points that the frame sees.
 void measure_depth(Odometry* odometry, const Frame& frame);
 
 }  // namespace tv

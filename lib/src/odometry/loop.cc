@@ -189,7 +189,8 @@ bool meets(Odometry* odometry, const Frame& frame, double path, int32_t keyframe
   return is_believed(odometry, frame, path, num_inliers, num_matches, *end);
 }
 
-// The pose of a keyframe between what the loop's beginning says of it and what its end says.
+// A pose of a keyframe between the one that follows from the beginning of the loop and the one that
+// follows from its end; share 0 is the first, 1 the second.
 MovedKeyframe blend(const Rigid& from_begin, const Rigid& from_end, double scale, double share) {
   MovedKeyframe moved;
   Rigid rotation = scaled_motion(motion_between(from_begin, from_end), share);

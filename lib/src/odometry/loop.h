@@ -27,8 +27,8 @@ bool is_jump(Odometry* odometry, const Rigid& before, int32_t keyframe);
 // for a loop.
 bool is_plausible(const Odometry& odometry, const Frame& frame, double path, const LoopEnd& end);
 
-// Whether a loop with few inliers, or with a large correction, agrees with the last such loop,
-// whose place it takes. `frame` has its pose.
+// Whether a loop with few inliers, or with a large correction, agrees with the last such loop; this
+// loop is then remembered in its place. `frame` has its pose.
 bool is_seen_twice(Odometry* odometry, const Frame& frame, const LoopEnd& end);
 
 // Whether a loop closes: at once, or together with another one that agrees. `path`: the length of
@@ -45,8 +45,9 @@ bool find_loop(Odometry* odometry, const Frame& frame, int32_t count, Frame* aga
 // the same segment as the loop's end. Returns whether the path jumps.
 bool close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const LoopEnd& end);
 
-// Looks for the segments of the keyframes from number `first` on in the keyframes before it. Those
-// that meet them become part of theirs. Returns how many.
+// Compares the keyframes from number `first` on with those before it that are of other segments.
+// Where two segments meet, the later one becomes part of the earlier one. Returns how many segments
+// were joined.
 int32_t join_segments(Odometry* odometry, int32_t first);
 
 }  // namespace tv

@@ -30,7 +30,8 @@ void release_point(Map* map, int32_t point) {
   --map->num_points;
 }
 
-// The way to a keyframe begins where that to the one before it, which is removed, began.
+// After the keyframe before `own` was removed: the way to `own` becomes the sum of the way to the
+// removed keyframe and its own.
 void join_ways(const MapKeyframe& removed, MapKeyframe* own) {
   Rigid way = motion_between(removed.cam_from_world, own->cam_from_world);
   std::copy_n(own->way_m, 3, way.t);
@@ -41,8 +42,8 @@ void join_ways(const MapKeyframe& removed, MapKeyframe* own) {
   own->is_contrary = removed.is_contrary || own->is_contrary;
 }
 
-// Frames that were relative to a keyframe that is removed, also those of others before it, are
-// relative to one that stays.
+// The poses of frames that were relative to a keyframe which is removed now, or to one that was
+// removed before and is relative to it, become relative to the keyframe `stays`.
 void keep_relation(Map* map, const MapKeyframe& removed, const MapKeyframe& stays) {
   RemovedKeyframe own{removed.id, stays.id,
                       motion_between(removed.cam_from_world, stays.cam_from_world),

@@ -138,7 +138,8 @@ inline bool is_marked(const Map& map, int32_t point) {
 void mark_points(Map* map, const int32_t* points, int32_t num);
 int32_t count_marked(const Map& map, const MapKeyframe& keyframe);
 
-// The planes of a keyframe that has its descriptors are computed when they are next used.
+// Forgets the cached planes of a keyframe that still has its descriptors; they are computed again
+// when they are needed.
 void forget_planes(const Map& map, const MapKeyframe& keyframe);
 
 // Adds a keyframe with the keypoints and descriptors of a frame, none of which sees a point, and
@@ -156,8 +157,8 @@ void forget_observation(Map* map, int32_t keyframe, int32_t keypoint);
 // its point in that order. Both arrays have room for end_points.
 void rank_points(const Map& map, int32_t* places, int32_t* ranks);
 
-// The pose that a keyframe is to have, and the factor of the distances of its points; 0 where it
-// stays, and its pose here is not read.
+// The new pose of a keyframe, and the factor by which the distances of its points change. Factor 0:
+// the keyframe is not moved, and the pose is not read.
 struct MovedKeyframe {
   Rigid cam_from_world;
   double scale;

@@ -88,7 +88,7 @@ struct Numbers {
 template <typename Member>
 using NumberOf = std::remove_all_extents_t<Member>;
 
-// Those from the one member to the other.
+// The numbers of a struct from the member `first` to the member `last`.
 #define TV_NUMBERS(Struct, first, last)                                              \
   Numbers {                                                                          \
     offsetof(Struct, first), sizeof(NumberOf<decltype(Struct{}.first)>),             \

@@ -9,8 +9,8 @@
 namespace tv {
 namespace {
 
-// A window takes the noise of a corner as one pixel, which is twice what it is; so is then that of
-// the velocities.
+// A window assumes a noise of one pixel for a corner, twice the real one. The standard deviations
+// of the velocities are multiplied by the same factor, so that the weights stay in proportion.
 constexpr double kNoise = 2;
 constexpr double kLargestShare = 0.5;  // of a way, by which the map may contradict it
 constexpr float kLeastDepthSigma = 0.002f, kLargestDepthSigma = 1.0f;

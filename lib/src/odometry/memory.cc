@@ -100,7 +100,8 @@ Odometry* lay_out(const MemoryPlan& plan, void* memory, uint8_t** context_memory
       arena_over(static_cast<uint8_t*>(memory) + kOdometryBytes, plan.num_bytes - kOdometryBytes);
   *context_memory = arena_alloc<uint8_t>(arena, plan.context_bytes);
   o->scratch = arena_over(arena_alloc<uint8_t>(arena, plan.scratch_bytes), plan.scratch_bytes);
-  // They follow each other.
+  // The end of the context's memory and the scratch memory follow each other, so that together they
+  // are one block.
   uint8_t* begin = *context_memory + (plan.context_bytes - plan.shared_bytes);
   uint8_t* end = o->scratch.memory + plan.scratch_bytes;
   o->whole_scratch = arena_over(begin, static_cast<size_t>(end - begin));

@@ -30,15 +30,15 @@ void add_reach(Odometry* odometry, const Frame& frame, bool gap);
 // Whether the sensors allow that a frame that was lost is where it was found. Places look alike.
 bool is_reachable(const Odometry& odometry, const Frame& frame);
 
-// The newest keyframe takes the way from the one before, as the velocities say it, and the segment
-// gets the metre as its unit once the scale is known to a tenth.
+// Stores with the newest keyframe the way from the keyframe before, as the velocities measure it;
+// makes the metre the unit of the segment once the scale is known to 10 %.
 void measure_scale(Odometry* odometry, Frame* frame);
 
 // Sums up what the ways between the segment's keyframes, as they are now, say of the scale.
 void gather_ways(Odometry* odometry);
 
-// What the evidence says: product / square is the scale, and 1 / square its variance. Of all of it
-// together, `source` (tv_scale_source) names the sensors that it is of.
+// An estimate of the scale from evidence: product / square is the scale, and 1 / square its
+// variance. `source` (tv_scale_source) names the sensors of all the evidence together.
 struct ScaleEstimate {
   int32_t source;
   double product, square;
@@ -47,11 +47,12 @@ ScaleEstimate height_estimate(const MetricScale& scale);
 ScaleEstimate velocity_estimate(const MetricScale& scale);
 ScaleEstimate estimate_of(const MetricScale& scale);
 
-// The evidence that gives this estimate, for a map that is loaded: a map's bytes keep the estimate
-// alone, and nothing of a scale that was contradicted.
+// The evidence that corresponds to an estimate read from a map's bytes, which hold the estimate
+// alone, and none that was contradicted.
 MetricScale scale_of(const ScaleEstimate& estimate, int32_t source, double sigma);
 
-// A segment, whose unit is `scale` of the tracked one's, became part of it.
+// After a segment became part of the tracked one: adds its evidence on the scale. One unit of that
+// segment is `scale` units of the tracked one.
 void join_scale(const MetricScale& other, double scale, Odometry* odometry);
 
 // Keeps what is known of the scale of the segment `from`, and takes up what is known of that of

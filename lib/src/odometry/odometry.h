@@ -66,8 +66,8 @@ enum class Work : int32_t {
   kStepSpread,  // a part of what a loop, or a correction of the camera, left (odometry/spread.h)
 };
 
-// A frame that seems to close a loop, but with few points: where it is, and where the loop's end
-// says that it is.
+// A frame that seems to close a loop, but with few points: its pose as tracked, and its pose as
+// found at the other end of the loop.
 struct WeakLoop {
   int32_t frame;  // its number; -1: there is none
   Rigid cam_from_world, end_from_world;
@@ -123,9 +123,9 @@ struct MetricScale {
   int32_t loaded_source;  // the source of the scale in a map that was loaded
   bool is_contradicted;   // heights and velocities contradict each other
   bool was_known;         // the metre is or has been the unit of the segment
-  // What a map's bytes brought, and the sums over the keyframes' ways and that: of heights, of
-  // velocities, and of those ways that contradict the map and are left out as long as the others
-  // say more.
+  // loaded: the evidence from a loaded map. height, velocity: `loaded` and the sums over the ways
+  // between keyframes, as heights and as velocities measure them. contrary: the sum over the ways
+  // whose velocities contradict the map; they are left out as long as the other ways count more.
   ScaleEvidence loaded, height, velocity, contrary;
   double sigma;  // relative; 0 where the source is TV_SCALE_UNIT
 };
@@ -201,8 +201,9 @@ struct tv_odometry {
   double last_time_s;
   bool is_upright;  // the segment's z axis points along gravity
   tv::Travel travel;
-  // Ways between keyframes that the velocities agreed with, a quarter fewer after each removal
-  // because of them; and frames in a row that they contradict while they are trusted so.
+  // velocity_trust: how many ways between keyframes the velocities agreed with; a quarter is taken
+  // off whenever the velocities have caused a removal. num_contrary: how many frames in a row have
+  // contradicted the velocities since these are trusted.
   int32_t velocity_trust, num_contrary;
   tv::MetricScale scale;
   // What is known of another segment's scale.

@@ -26,8 +26,8 @@ int32_t match_points(Odometry* odometry, const int32_t* points, int32_t num, dou
 
 void forget_points(Frame* frame);
 
-// By how many pixels the error of a point's depth may move its image, one standard deviation, for a
-// camera at `centre`, in whose frame the point is x.
+// The standard deviation, in pixels, of a point's projection that the error of its depth causes,
+// for a camera whose centre is at `centre`; x is the point in that camera's frame.
 double depth_error_px(const Odometry& odometry, const MapPoint& point, const double centre[3],
                       const double x[3]);
 

@@ -32,7 +32,8 @@ void step_spread(Odometry* odometry, Frame* frame) {
   const Rigid relative = compose(frame->cam_from_world, inverse(before));
   if (!adjust_segment(odometry, spread->segment, spread->first_id, 1)) spread->num_steps = 0;
   frame->cam_from_world = compose(relative, reference.cam_from_world);
-  // The beginning of the way that is compared with the velocities moves with it, too.
+  // The place from which the next way is measured, for the comparison with the velocities, moves
+  // with the map.
   double from[3];
   transform(before, odometry->travel.from, from);
   transform(inverse(reference.cam_from_world), from, odometry->travel.from);

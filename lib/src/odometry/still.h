@@ -7,8 +7,8 @@
 
 namespace tv {
 
-// The matches of a pair that keep their pixel make their cells still; only where its estimate has
-// left them out (tv_two_view.num_still).
+// Marks the cells of the matches whose pixel is the same in both frames as still, but only if the
+// pair's estimate has left such matches out (tv_two_view.num_still).
 void mark_still(Odometry* odometry, const tv_keypoint* keypoints0, const tv_keypoint* keypoints1,
                 const tv_correspondence* matches, int32_t num);
 

@@ -7,14 +7,14 @@
 
 namespace tv {
 
-// The piece of work that comes next.
+// Which piece of work is the next one to be done.
 Work next_work(const Odometry& odometry);
 
-// Does it, and returns which it was. `frame`: the last one that was tracked; its pose moves with
-// the map.
+// Does the next piece of work, and returns which one it was. `frame`: the frame that was tracked
+// last, whose pose is moved with the map.
 Work do_next_work(Odometry* odometry, Frame* frame);
 
-// Does all of it.
+// Does all work that is left.
 void finish_work(Odometry* odometry);
 
 }  // namespace tv

@@ -22,8 +22,8 @@ inline bool is_full_pose(const tv_two_view& result) {
   return result.has_R != 0 && result.has_t != 0;
 }
 
-// Gives *again, an estimate that takes_guided_estimate accepts, the judgement of the first one, and
-// the evidence that it is from.
+// Copies the judgement and the evidence of the first estimate to *again, an estimate that
+// takes_guided_estimate accepted.
 void keep_judgement(const PairResult& first, PairResult* again);
 
 // Writes a byte for each match: 1 for an inlier, else 0.

@@ -1,7 +1,7 @@
 // Rigid motions as plain numbers, which lie in the caller's memory and are copied as bytes: a point
 // X becomes R X + t. Their names say the frames, such as cam_from_world; a `world` is that of the
-// map's segment. Pose (geometry/essential.h) is the form with which the estimators calculate. Tests:
-// test/unit/test_odometry_map.cc.
+// map's segment. Pose (geometry/essential.h) is the form with which the estimators calculate.
+// Tests: test/unit/test_odometry_map.cc.
 #pragma once
 
 #include "geometry/camera.h"

@@ -7,8 +7,9 @@
 namespace tv {
 namespace {
 
-// One number of the evidence: how much it adds to the logit, and the reason that it is evidence
-// for. usual: its value in the median of the right poses, in which it adds nothing to a doubt.
+// One term of the logit of the probability that the pose is wrong: its weight, and the reason that
+// is given where the term is large. usual: the median of the evidence over right poses, where the
+// term is 0.
 struct Part {
   double weight, usual;
   uint32_t reason;
@@ -22,8 +23,8 @@ constexpr Part kPlaces = {-3.085, 2.996, TV_REASON_TOO_FEW_MATCHES};
 constexpr Part kRegionShift = {0.510, -7.044, TV_REASON_CROWDED_MATCHES};
 constexpr double kAlternative = 2.114;
 
-// More places than this are no more evidence: what is wrong with a pose that so many agree on is
-// not that they are few.
+// The number of places counts up to this value only: a pose with more of them may be wrong, but not
+// because its places are few.
 constexpr double kEnoughPlaces = 20;
 
 double clamped(double x, double low, double high) { return std::max(low, std::min(x, high)); }

@@ -30,9 +30,9 @@ struct WrongMatch {
 };
 WrongMatch draw_wrong_match(Random& random, int n);
 
-// The share of wrong pairings of n matches that agree, averaged with a prior that counts as 100 of
-// them. Few matches have fewer different pairings than were drawn, and count less against it.
-// most: how many may be drawn.
+// The probability that a wrong pairing of n matches agrees: the share of the drawn pairings that
+// agree, averaged with `prior`, which counts as 100 pairings. Among few matches some pairings are
+// drawn more than once, so that the draws count for less. most: how many may be drawn.
 double chance_from_pairings(int agreeing, int drawn, int most, int n, double prior);
 
 // The probability that a point of view 0, matched with a wrong point of view 1, agrees with M. It

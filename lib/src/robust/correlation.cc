@@ -12,8 +12,8 @@ namespace {
 constexpr int kLevels = 3, kBlocks = 1 << kLevels, kPose = PoseModel::kParameters;
 constexpr int kMost = PlaneModel::kParameters, kPacked = kMost * (kMost + 1) / 2;
 
-// Where kappa begins to count, and the width over which it comes to count in full. Few pairs of
-// independent errors exceed it.
+// kappa counts from the first value on, and in full from the first plus the second. In pairs whose
+// errors are independent, kappa seldom exceeds it.
 constexpr double kFirstKappa = 1.35, kKappaWidth = 0.2;
 constexpr double kJackknives = 4;  // docs/decisions/0024-honest-covariance.md
 

@@ -58,7 +58,8 @@ Grid make_grid(const double* xy, int num, Arena& arena) {
     grid.low[axis] = low;
     grid.inverse[axis] = high > low ? side / (high - low) : 0;
   }
-  // A counting sort: the ends of the cells, each of which moves to the cell's first point.
+  // A counting sort: first[c] is the end of cell c at first, and is lowered with each point of the
+  // cell that is stored, so that it becomes the index of the cell's first point.
   for (int c = 0; c <= num_cells; ++c) grid.first[c] = 0;
   for (int i = 0; i < num; ++i) ++grid.first[grid.cell(xy[2 * i], xy[2 * i + 1])];
   for (int c = 1; c <= num_cells; ++c) grid.first[c] += grid.first[c - 1];

@@ -1,5 +1,5 @@
-// The principal point of the one camera that saw both views: what the matches say of it.
-// docs/algorithms/principal_point.md.
+// Of a pair that one camera took: how well its matches agree with the given principal point, and
+// which shift of it fits them best. docs/algorithms/principal_point.md.
 #pragma once
 
 #include "robust/gravity.h"

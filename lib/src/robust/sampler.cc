@@ -47,7 +47,7 @@ void draw_sample(Sampler& sampler, int32_t* sample) {
   if (sampler.pool >= sampler.num) {
     return draw_distinct(sampler.random, sampler.num, sampler.size, sample);
   }
-  // The newest of the pool, and the others from before it.
+  // The sample has the newest match of the pool, and the others are drawn from the older ones.
   draw_distinct(sampler.random, sampler.pool - 1, sampler.size - 1, sample);
   sample[sampler.size - 1] = sampler.pool - 1;
 }

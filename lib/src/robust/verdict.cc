@@ -123,9 +123,8 @@ uint32_t reasons_of(const Evidence& e) {
   }
   if (is_refused(e)) return reasons;
   if (e.looks_repeated) reasons |= TV_REASON_REPEATED_STRUCTURE;
-  // Of mirrored pictures the matches that would show that the pictures are of one scene are
-  // missing. Those that there are lie on corners that are their own mirror image, and for such
-  // matches there is a pose, too.
+  // Pictures of which one is mirrored have no matches where the scene itself would match. Matches
+  // exist only at corners that are symmetric, and a pose fits these, too.
   if (e.looks_mirrored) reasons |= TV_REASON_LOW_INLIER_RATIO;
   return reasons;
 }

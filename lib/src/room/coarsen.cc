@@ -30,8 +30,8 @@ Voxel mean_of(const Voxel children[8]) {
           pack_colour(colours)};
 }
 
-// The block of twice the voxel that takes the place of eight, of which those that do not exist are
-// below 0.
+// Makes the block of the coarser level from its eight children; a child that does not exist has an
+// index below 0.
 void merge(const tv_room& room, const int32_t children[8], Voxel merged[kBlockVoxels]) {
   for (int32_t v = 0; v < kBlockVoxels; ++v) {
     Voxel around[8];

@@ -7,11 +7,12 @@
 namespace tv {
 namespace {
 
-// Where the nearest pixel is unknown, a neighbour stands in for it with this part of its weight: it
-// fills holes, and yet moves an outline, where others see it, by little.
+// Where the pixel nearest to a voxel is unknown, the nearest known neighbour is used with 1 /
+// kBorrowed of its weight. This closes holes, and hardly moves an outline where other views see it.
 constexpr int32_t kBorrowed = 4;
-// Inferred distances have no errors that average out: they are fused at most so many voxels before
-// and behind their surface. That is a voxel across it where it is seen at an angle of 20 degrees.
+// Inferred distances are not averaged over views: they are fused up to this many voxels before and
+// behind their surface, which is one voxel across the surface where it is seen at an angle of 20
+// degrees.
 constexpr int32_t kInferredVoxels = 3;
 // Comparisons with what a tile measured at most or at least leave this part of a distance for what
 // numbers are rounded by.
@@ -71,7 +72,8 @@ Corners corners_of(const Fusion& f, double u, double v) {
   return {x, y, u - x, v - y, known};
 }
 
-// The known one that is nearest, of which there is one. is_borrowed: it is not the nearest of all.
+// Of the four corners the nearest that is known; at least one is. is_borrowed: the nearest corner
+// is unknown.
 Place nearest_known(const Corners& c, bool* is_borrowed) {
   const bool right = c.a >= 0.5, low = c.b >= 0.5;
   const int32_t nearest = (right ? 1 : 0) + (low ? 2 : 0);
@@ -272,7 +274,8 @@ TileRange tiles_around(const Fusion& f, const Ball& ball) {
           tile_at(u + across, map.width), tile_at(v + down, map.height)};
 }
 
-// Whether the view may see through something of a block, of which it sees the centre.
+// Whether some part of a block whose centre the view sees may lie in front of what the view
+// measured, by more than the truncation.
 bool may_see_through(const Fusion& f, int32_t index) {
   const Ball ball = ball_of(f, index);
   double u, v;
@@ -363,8 +366,8 @@ bool visit_near(const Fusion& f, const Visit& visit) {
   return true;
 }
 
-// Lists the blocks near the view's surface in room.near. make: those that the room lacks are made;
-// where there is no memory for them, it returns false and leaves the room as it was.
+// Lists the blocks near the view's surface in room.near. make: adds the blocks that the room does
+// not have; without memory for them it returns false and leaves the room as it was.
 bool list_near_blocks(tv_room& room, const Fusion& f, bool make) {
   ++room.num_calls;
   room.num_near = 0;

@@ -10,7 +10,7 @@ namespace tv {
 // the room is as it was.
 bool add_view(tv_room& room, const RoomView& view);
 
-// Subtracts them from the blocks that existed when the view was added.
+// Subtracts the view's contributions from the blocks that existed when the view was added.
 void subtract_view(tv_room& room, const RoomView& view, uint32_t added_at);
 
 // Adds the view's contributions to the blocks that were made since it was added: to what it sees

@@ -17,7 +17,8 @@ constexpr double kLeastShare = 0.1;
 // How far from the region, in pixels, what its edge shows may be measured: texture begins where the
 // smoothed picture has its edge, and a depth map rarely reaches to there.
 constexpr int32_t kEdgeReach = 6;
-// For each pixel that was measured on the plane, the most that were measured beyond it.
+// The largest ratio of the pixels that were measured beyond the plane to those that were measured
+// on it.
 constexpr double kMostBeyond = 0.15;
 // The most of the region's measured pixels that may lie on none of the planes carried into it.
 constexpr double kMostOff = 0.3;
@@ -254,7 +255,7 @@ int32_t infer_distances(const tv_room& room, const RoomView& view, const InferRe
       if (is_known(readings, at % map.width, at / map.width) || !sight_at(view, at, &sight)) {
         continue;
       }
-      // In a room the nearest of the planes is the one that is seen.
+      // Of several planes the camera sees the nearest one.
       double nearest = 0;
       const tv_room_plane* seen = nullptr;
       for (int32_t p = 0; p < request.num_planes; ++p) {

@@ -10,9 +10,11 @@ namespace {
 
 constexpr int32_t kGrid = kBlockSide + 1;  // a block's voxels, and the first of those after it
 constexpr int32_t kGridStep[3] = {1, kGrid, kGrid* kGrid};
-// What a map that sees through a voxel weighs there, against those that see a surface.
+// A map that sees through a voxel counts there as a measurement of the largest distance with this
+// weight.
 constexpr int32_t kFreeWeight = 8;
-// What was inferred counts where more than four maps inferred it for each that sees through it.
+// An inferred surface is part of the mesh if more than four maps inferred it for each map that sees
+// through it.
 constexpr int32_t kMostThroughInferred = 4;
 constexpr int32_t kLeastInferred = 2;
 // The least length of the mean of a block's normals.
@@ -269,8 +271,9 @@ bool is_sure(const MeshRequest& request, const tv_room_vertex* vertices, const i
   return sure || request.max_sigma == 0;
 }
 
-// Pieces are sets of vertices, joined in their `reserved`: the vertex that stands for its set holds
-// -1 less the number of its triangles, all others one that is nearer to it.
+// Connected pieces of the mesh as disjoint sets of vertices, linked by `reserved`: the root of a
+// set holds -1 minus its number of triangles, every other vertex the index of a vertex nearer to
+// the root.
 int32_t piece_of(tv_room_vertex* vertices, int32_t v) {
   while (vertices[v].reserved >= 0) {
     const int32_t next = vertices[v].reserved;

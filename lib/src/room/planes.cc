@@ -24,8 +24,8 @@ constexpr double kPatch = 9;
 // A plane is upright or level where it is so to within 10 degrees.
 constexpr double kUprightSine = 0.174, kLevelCosine = 0.985;
 
-// What blocks are of, beside planes. While a plane is fitted, those that belong to it are of its
-// largest part or of its others.
+// The plane of a block is its index, or one of these. kOfLargest and kOfOthers: while a plane is
+// fitted, a block of it that is in its largest connected part, or in another part.
 constexpr int32_t kOfNone = -1, kIgnored = -2, kOfLargest = -3, kOfOthers = -4;
 
 struct Plane {

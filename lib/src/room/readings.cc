@@ -47,7 +47,8 @@ Tiles make_tiles(Readings* readings, void* memory, size_t size_bytes) {
   const tv_depth_map& map = readings->map;
   const int32_t words = ((map.width - 1) >> 6) + 1;
   const size_t num_words = static_cast<size_t>(words) * static_cast<size_t>(map.height);
-  // The tiles get a third of the memory or more, so that they stay small.
+  // The bits are made only where they leave a third of the memory for the tiles, so that these stay
+  // small.
   uint64_t* known = nullptr;
   if (3 * num_words * sizeof *known <= 2 * size_bytes) {
     known = static_cast<uint64_t*>(memory);

@@ -87,8 +87,8 @@ struct Tile {
   float least, most;  // distances
 };
 
-// The squares of a map. Their side is the least power of two, of 8 pixels or more, with which they
-// fit into the memory that they are given.
+// The depth map divided into squares. Their side is the smallest power of two, at least 8 pixels,
+// with which all tiles fit into the given memory.
 struct Tiles {
   Tile* tile;
   int32_t columns, rows, shift;  // log2 of the side
@@ -99,10 +99,10 @@ struct TileRange {
   int32_t left, top, right, bottom;
 };
 
-// Makes them, and the bits of the readings where there is memory for both.
+// Makes the tiles, and the bits of the readings if the memory has room for both.
 Tiles make_tiles(Readings* readings, void* memory, size_t size_bytes);
 
-// All of them in one.
+// One tile with the least and the most of all tiles.
 Tile joined(const Tiles& tiles);
 
 }  // namespace tv

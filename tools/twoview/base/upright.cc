@@ -24,7 +24,8 @@ Vector3 up_of_cameras(const std::vector<Matrix3>& world_from_cam, int turn_deg) 
   const double length = cv::norm(down);
   if (!(length > 0)) return {0, -1, 0};
   down /= length;
-  // The sum of what u is off: of the level ones' mean, and of the mean down. Its least eigenvector.
+  // The cost of a direction u as up: how far the cameras are from level, and how far their mean is
+  // from down, each over its variance. Its least eigenvector is up.
   const cv::Matx33d cost =
       not_level * (1 / (kRoll * kRoll * static_cast<double>(world_from_cam.size()))) +
       (cv::Matx33d::eye() - down * down.t()) * (1 / (kPitch * kPitch));

@@ -189,8 +189,8 @@ void look_for_any_board(const cv::Mat& small, cv::Size inner, Found& found) {
   cv::Size seen = meta.size();
   if ((seen.width < seen.height) != (inner.width < inner.height))
     std::swap(seen.width, seen.height);
-  // A grid of the requested size that the search for it refused: a part of the board, and something
-  // beside it.
+  // The grid has the requested size, but the search for a board of this size refused it: so it is a
+  // part of the board together with something beside the board.
   if (seen == inner) {
     found.reason = Reason::kPartialBoard;
     return;

@@ -154,7 +154,8 @@ void put_bars(cv::Mat& sheet, cv::Rect place, const std::vector<BoardView>& view
                   cv::Point(cvRound(x + 0.88 * step), cvRound(bottom)),
                   distinct(static_cast<int>(fit.view)), cv::FILLED);
     if (step < 34) continue;
-    // The number stands above its bar, and above the line where that would go through it.
+    // The number is written above its bar; where the line would then cross the number, above the
+    // line.
     const bool is_crossed = line < y && line > y - 18;
     put_text(sheet, words("%.2f", fit.rms_px), {x + step / 2, (is_crossed ? line : y) - 6}, 8,
              ink::text, Align::kCentre);

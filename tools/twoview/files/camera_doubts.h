@@ -1,4 +1,5 @@
-// Intrinsics that are those of the image only in another order, or of an image of another size.
+// Refuses intrinsics that do not fit their image, but would fit it if their values were in another
+// order, or fit an image of another size.
 #pragma once
 
 #include <string>
@@ -12,8 +13,9 @@ namespace cli {
 // the message begins with. python/twoview/camera.py has the same rule.
 void refuse_exchanged(const tv_camera& camera, const std::string& where);
 
-// For intrinsics that came without an image size, in a camera that has that of the image: throws
-// BadInput where the principal point is that of an image that is larger or smaller on both axes.
+// For intrinsics that were read without an image size and were given that of the image: throws
+// BadInput where their principal point is the centre of an image that is larger, or smaller, on
+// both axes.
 void refuse_other_scale(const tv_camera& camera, const std::string& where);
 
 // Throws BadInput where intrinsics for an image, as those on the line of a list of pairs, are not

@@ -208,7 +208,8 @@ constexpr const char* kHarmlessStarts[] = {
     "board",      "square",         "marker",      "pattern", "checker",
     "chessboard", "aruco",          "charuco",     "grid",    "perview",
     "extrinsic",  "calibrateusing", "overlapping", "lapping", "imu"};
-// Names that may concern the lens: what they contain, or the whole of them.
+// A name that contains one of these may concern the lens; suspect_whole has the names that may as a
+// whole.
 constexpr const char* kSuspect[] = {
     "dist",      "coef",       "lens",      "fish",  "focal",    "radial",  "tangential", "skew",
     "binning",   "roi",        "sigma",     "resol", "width",    "height",  "size",       "shape",
@@ -223,7 +224,7 @@ const std::regex& suspect_whole() {
       "type");
   return names;
 }
-// Of these a value of 0 says that there is none.
+// Names of terms of a lens which the camera does not have if their value is 0.
 const std::regex& zero_is_none() {
   static const std::regex names(
       "[kpsbqt][0-9]+|[abc]|skew|tau[xy]?|tx|ty|radial|tangential|xi|kappa[0-9]*|lambda|barrel");
@@ -297,8 +298,9 @@ struct Found {
   T value;
 };
 
-// The entry of one of these names, as `read` gives it; empty where there is none or it is null.
-// Several spellings of one entry must agree.
+// Takes the entries that have one of these names, and returns the value as `read` reads it; empty
+// where there is no such entry or its value is null. Entries under several spellings of the name
+// must have the same value.
 template <class Read>
 auto take(CameraEntries& entries, const Names& names, const Read& read)
     -> std::optional<Found<decltype(read(YAML::Node(), "", ""))>> {
@@ -430,7 +432,7 @@ Four pinhole_of(CameraEntries& entries) {
 
 // ---- lens --------------------------------------------------------------------------------------
 
-// What the entries say of the lens, and the entry that says it.
+// The kind of lens that the entries name, and the entry that names it.
 struct Said {
   Lens lens = Lens::kAny;
   std::string by;

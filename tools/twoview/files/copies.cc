@@ -76,7 +76,7 @@ double correlation(const fs::path& a, const fs::path& b) {
   return cv::mean((x - mean_x[0]).mul(y - mean_y[0]))[0] / sigmas;
 }
 
-// A marked picture, and how much of its original it shows.
+// A picture whose name has a mark of a copy, and whether it shows the same as the original.
 struct Marked {
   std::string name, original;
   CopyMark mark = CopyMark::kNone;
@@ -85,7 +85,9 @@ struct Marked {
 
 using Names = std::set<std::string>;
 
-// Pictures of `series` are not decoded: one behind the same name is known to show something else.
+// Judges the picture `name`. Where the original is in `series` (another picture with a mark of the
+// same kind shows something else, so that the marks are numbers of a series), the two are not
+// decoded and compared.
 Marked marked(const fs::path& folder, const std::string& name,
               const std::map<std::string, std::string>& by_stem, const Names& series) {
   Marked result;
@@ -177,7 +179,7 @@ Copies copies_of(const fs::path& folder, const std::vector<std::string>& names) 
       numbered.insert(picture.original);
     }
   }
-  // One original with numbers behind its name is a series, which needs no word.
+  // Where one original alone has copies with numbers, these are a series, and no note is needed.
   if (numbered.size() > 1)
     kept_words.insert(kept_words.end(), kept_numbers.begin(), kept_numbers.end());
   copies.note = kept_note(kept_words);

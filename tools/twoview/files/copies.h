@@ -8,7 +8,7 @@
 
 namespace cli {
 
-// How a name says that its file is a copy.
+// The mark by which a file's name says that the file is a copy.
 enum class CopyMark {
   kNone,
   kWord,       // "a - Copy (2)", "a (another copy)", "Kopie von a"

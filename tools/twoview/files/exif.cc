@@ -153,7 +153,7 @@ ExifFocal combined(double of_film, double of_sensor, double zoom) {
   return found;
 }
 
-// A tag's text without what stands behind its end; empty where it is none.
+// The text of a tag up to its terminating zero; empty where the tag holds no text.
 std::string text_of(ExifData* data, ExifTag tag) {
   ExifEntry* const entry = exif_content_get_entry(data->ifd[EXIF_IFD_EXIF], tag);
   if (!entry || !entry->data || entry->format != EXIF_FORMAT_ASCII) return "";

@@ -36,8 +36,8 @@ bool ends_as(const fs::path& path, const Endings& endings) {
   return std::find(endings.begin(), endings.end(), ending_of(path)) != endings.end();
 }
 
-// Of pictures that differ only in their ending one stays: that of the ending that most of the
-// folder's have, of the first in kImages on a tie.
+// Of pictures whose names differ only in their ending, keeps one: that with the ending which most
+// pictures of the folder have; on a tie, the ending that comes first in kImages.
 void leave_out_second_endings(FolderPictures& pictures) {
   std::map<std::string, size_t> counts;
   for (const std::string& name : pictures.names) ++counts[ending_of(name)];

@@ -35,7 +35,7 @@ struct FolderPictures {
 // are no pictures, and not mentioned. Throws BadInput where the folder cannot be read.
 FolderPictures pictures_of(const std::filesystem::path& folder);
 
-// Whether a file's ending is that of a picture that is read.
+// Whether the file's ending is that of an image format that the program reads.
 bool has_picture_ending(const std::filesystem::path& path);
 
 // A line where the numbers of a sequence's names jump, so that pictures may be missing; else empty.

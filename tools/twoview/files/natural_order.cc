@@ -39,7 +39,7 @@ std::vector<std::pair<size_t, size_t>> runs_of(std::string_view name) {
   return runs;
 }
 
-// A name as what stands before a number, the number and what stands behind it.
+// A name in three parts: what stands before a number, the number, and what follows it.
 struct Parts {
   std::string_view before, number, after;
 };
@@ -70,7 +70,7 @@ std::vector<Parts> parts_at(const std::vector<std::string>& names, size_t from_e
   return parts;
 }
 
-// The names around the one number in which they differ.
+// Splits all names at the one number in which they differ; empty where there is no such number.
 std::vector<Parts> parts_of(const std::vector<std::string>& names, bool with_fraction) {
   if (names.size() < 2) return {};
   for (size_t from_end = 0; from_end < runs_of(names[0]).size(); ++from_end) {

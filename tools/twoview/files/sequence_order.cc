@@ -22,7 +22,8 @@ namespace fs = std::filesystem;
 using Order = std::vector<size_t>;  // indices of the given names
 using Edge = std::pair<size_t, size_t>;
 
-// Neighbours that are compared of each order, evenly spread over those that are not of the other.
+// At most so many pairs of neighbours are compared of each order: evenly spread over the pairs that
+// are neighbours in this order and not in the other one.
 constexpr size_t kMostEdges = 24;
 constexpr double kSigmas = 3;
 constexpr size_t kLeastEdges = 6;  // fewer say nothing of the spread

@@ -139,7 +139,7 @@ std::string stripped(const std::string& text, const char* of) {
   return text.substr(first, text.find_last_not_of(of) + 1 - first);
 }
 
-// A map, a list or a word, as YAML would give it.
+// The element as a YAML map, list or scalar.
 YAML::Node value_of(const Element& element, const std::string& file) {
   if (element.parts.empty()) {
     const std::string text = stripped(element.text, kBlank);

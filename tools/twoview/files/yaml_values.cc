@@ -30,7 +30,7 @@ class StrictReader : public YAML::EventHandler {
   void OnDocumentStart(const YAML::Mark&) override {}
   void OnDocumentEnd() override {}
   void OnNull(const YAML::Mark& mark, YAML::anchor_t) override {
-    // Of a name without a colon yaml-cpp gives the null that it makes the name's own place.
+    // Where a name has no colon, yaml-cpp reports a null value at the same place as the name.
     const bool is_value =
         !levels_.empty() && levels_.back().is_block && !levels_.back().name_is_next;
     if (is_value && mark.pos == levels_.back().name_mark.pos)
@@ -150,8 +150,8 @@ YAML::Node parse_yaml(const std::string& text, const std::string& file) {
     std::istringstream stream(body);
     StrictReader reader;
     YAML::Parser parser(stream);
-    // A document takes a line at least. Of a text that is damaged yaml-cpp may find more of them
-    // without an end.
+    // Each document takes at least one line; in a damaged text yaml-cpp may find documents without
+    // end.
     auto lines = std::count(body.begin(), body.end(), '\n') + 1;
     while (parser.HandleNextDocument(reader))
       if (lines-- == 0) throw BadInput(file + ": no YAML, whose documents (---) have an end");

@@ -10,7 +10,8 @@
 
 namespace cli {
 
-// What the flight's finished map says of its camera. Takes a sixth of the flight's own time.
+// What the finished map of the flight is evidence for: whether the given camera is right. It takes
+// about a sixth of the flight's time.
 CameraEvidence check_camera(const Flight& flight);
 
 // The key camera_check of result.json: null where the map says nothing.

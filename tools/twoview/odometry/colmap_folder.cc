@@ -47,7 +47,7 @@ bool is_centred_pinhole(const tv_camera& c) {
          std::abs(c.cy - 0.5 * (c.height - 1)) < 0.5;
 }
 
-// Formats that all of these programs read.
+// Whether every program that reads COLMAP's files also reads this image format.
 bool is_usual_format(const std::string& file) {
   std::string ending = fs::path(file).extension().string();
   for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
@@ -163,7 +163,7 @@ std::string cloud_ply(const FlightResult& result, const ColmapPictures& pictures
   return bytes;
 }
 
-// Not where something else is in it, nor what only stands for a folder.
+// Removes the folder if it is empty; a symbolic link to a folder stays.
 void remove_empty_folder(const fs::path& folder) {
   std::error_code ignored;
   if (fs::is_directory(fs::symlink_status(folder, ignored))) fs::remove(folder, ignored);

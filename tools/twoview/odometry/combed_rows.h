@@ -11,8 +11,8 @@ namespace cli {
 class CombedRows {
  public:
   void add(const cv::Mat& luma);
-  // Of the pictures that were looked at those whose neighbouring rows differ by more than rows that
-  // are two apart.
+  // The share of the pictures examined in which neighbouring rows differ more than rows that are
+  // two apart.
   double share() const;
   // What the user must know of such pictures, as a line without an end; empty where there are few.
   std::string words() const;

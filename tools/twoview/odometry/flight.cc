@@ -385,7 +385,8 @@ void Flight::settle_repeated() {
   settle_waited();
 }
 
-// A picture of a camera that stood still is where the one before it is.
+// Gives a frame that was withheld because the camera stood still the pose and the status of the
+// frame before it.
 void Flight::settle_waited() {
   for (const size_t n : repeated_.waited()) {
     FlightFrame& frame = frames_[n];

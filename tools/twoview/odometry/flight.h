@@ -26,8 +26,8 @@ namespace cli {
 struct FlightKeyframe {
   tv_keyframe keyframe;
   std::vector<tv_map_observation> observations;
-  // Of its pose relative to the keyframe before it, as tv_odometry_covariance gives it; only after
-  // add_covariances.
+  // The covariance of the pose relative to the keyframe before it, as tv_odometry_covariance gives
+  // it; set by add_covariances.
   bool has_covariance = false;
   std::array<double, 36> covariance{};
 };
@@ -82,8 +82,8 @@ class Flight {
   void finish(const std::atomic<bool>& stop);
 
   const std::vector<FlightFrame>& frames() const { return frames_; }
-  // The frame that was given to the odometry after `number` others: unreadable and repeated ones do
-  // not count.
+  // The frame with this number among those that were given to the tracker. Unreadable and repeated
+  // frames are not given to it and are not counted.
   const FlightFrame& given(int number) const {
     return frames_[given_[static_cast<size_t>(number)]];
   }
@@ -105,7 +105,7 @@ class Flight {
   // By how much a viewer turns the frames clockwise, degrees.
   int turn_deg() const { return source_.turn_deg(); }
   const tv_odometry_state& state() const { return state_; }
-  // What was decided of the camera file: what was left out of it, and that it was scaled.
+  // Notes about the camera file: which entries were left out, and whether the camera was scaled.
   const std::vector<std::string>& notes() const { return notes_; }
   // As frames are tracked; after finish() with the principal point as the odometry has moved it.
   const tv_camera& camera() const { return camera_; }
@@ -140,7 +140,7 @@ class Flight {
 
   // The map as it is. The index of a point in points() is that of the observations.
   std::vector<FlightKeyframe> keyframes() const;
-  // Without what they see.
+  // The keyframes without their observations.
   std::vector<FlightKeyframe> keyframe_poses() const;
   std::vector<tv_map_point> points() const;
   // The points that a keyframe of the map sees (by its number, or as keyframes() gives it), each
@@ -165,10 +165,11 @@ class Flight {
   int32_t lost_status() const;
   // Gives the frame to the tracker; record then has what is known of it.
   void give(const SourceFrame& frame, FlightFrame& record);
-  // Of frames whose picture was repeated, what the pictures after them say.
+  // Once the pictures after a repeated one have come: decides whether the camera moved on
+  // meanwhile.
   void settle_repeated();
   void settle_waited();
-  // Says what was found of the frame that was given last.
+  // Reports to the source what the tracker found for the last frame that was given to it.
   void tell_source();
   void add_still_mask();
   void keep_colours(const SourceFrame& frame);

@@ -35,7 +35,8 @@ struct FlightFrame {
   bool live_metric = false;  // whether the map's unit was the metre then
   double live_scale_sigma = 0;
   Pose live;
-  // What gives its pose in any state of the map; number -1: it was not given to the tracker.
+  // The frame's record, from which tv_path_poses gives its pose in any later state of the map;
+  // number -1: the frame was not given to the tracker.
   tv_path_frame known{0, -1, TV_PATH_UNKNOWN, -1, 0, {}, {}};
   // The pose in the last state of the map, and how it was found; segment -1: none.
   PoseOrigin origin = PoseOrigin::kNone;

@@ -44,8 +44,8 @@ struct CameraEvidence {
   // By how much farther from the middle than by the given camera a ray meets the picture, over the
   // distance, and its standard deviation.
   double edge_change = 0, edge_sigma = 0;
-  // Of the principal point, x and y: where that of the camera that fits is, in pixels from the
-  // given one, and its standard deviations. Pixels that are not square show here, too.
+  // How far the principal point of the camera that fits the map lies from the given one, x and y in
+  // pixels, and the standard deviations. A wrong ratio of fx and fy shows here, too.
   std::array<double, 2> centre_shift_px{}, centre_sigma_px{};
   double focal_px = 1;  // of the given camera
 

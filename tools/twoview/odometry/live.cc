@@ -54,7 +54,7 @@ double cpu_ms() {
   return 1e3 * static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_nsec);
 }
 
-// Where both threads want the same core, this one gets 3.4 % of it.
+// At this priority the thread gets 3.4 % of a core that both threads want.
 void lower_priority_of_this_thread() {
 #ifdef __linux__
   setpriority(PRIO_PROCESS, 0, 15);
@@ -117,7 +117,7 @@ struct LivePage::State {
   std::optional<LiveRoom::Job> job;  // to be fused
 #endif
 
-  // Of the thread that tracks.
+  // Used by the thread that tracks only.
   uint64_t updated_ns = 0;
   double watched_since_ms = -1, spent_ms = 0;  // of its CPU time
   std::set<int32_t> coloured;                  // ids of keyframes
@@ -128,7 +128,7 @@ struct LivePage::State {
   std::optional<LiveRoom> room;
 #endif
 
-  // Of the thread that writes.
+  // Used by the thread that writes only.
   std::deque<Sightings> sightings;  // the newest first
   std::map<int32_t, Rgb> colours;   // by the ids of points
 
@@ -290,8 +290,8 @@ void LivePage::update(const Flight& flight) {
   s.spent_ms += cpu_ms() - began_ms;
 }
 
-// Gives the other thread what it has room for. It holds the mutex for moments only, but may be
-// interrupted then for long, which the tracking does not wait for.
+// Copies for the writing thread what that has room for. The writing thread holds the mutex briefly,
+// but may be interrupted for long while it does; so the tracking thread never waits for the mutex.
 void LivePage::State::copy(const Flight& flight) {
 #ifdef TWOVIEW_HAS_ROOM
   if (room && room->keep(flight)) {

@@ -13,8 +13,9 @@ namespace {
 // Pictures are kept at this longer side at most, and so many of them: 25 MB of colour.
 constexpr int kLongerSide = 640;
 constexpr size_t kMostKept = 48;
-// A keyframe waits for so many frames after it: in steps of 0.02 they are a fifth of the median
-// depth away, where its farthest partners are.
+// A keyframe waits for this many later frames. Kept frames are 0.02 of the median depth apart, so
+// the last of them is a fifth of the median depth away: as far as the farthest partners of a
+// keyframe.
 constexpr size_t kAfter = 10;
 
 cv::Mat small_copy(const cv::Mat& picture, const cv::Size& size, int interpolation) {

@@ -55,7 +55,7 @@ const std::vector<std::string> kFiles = {"trajectory.txt", "live.txt",        "k
                                          kCameraFile,      "covariances.txt", kStillFile,
                                          "frames.csv",     "cloud.ply",       "map.twm",
                                          "report.html",    "result.json",     kEstimatedFile};
-// These, and those of a room.
+// The names of all files that the verb writes, with those of the room.
 std::vector<std::string> own_files() {
   std::vector<std::string> names = kFiles;
 #ifdef TWOVIEW_HAS_ROOM
@@ -94,7 +94,7 @@ bool is_number(const std::string& text) {
 
 bool is_auto(const Arguments& a) { return a.flight.focal_35mm == kAutoFocal; }
 
-// For a source that says nothing of its camera: `why`.
+// Throws BadInput where no camera is given and the source has none, because of `why`.
 void require_camera(const Arguments& a, const char* why) {
   if (a.camera.empty() && a.flight.focal_35mm == 0)
     throw BadInput(std::string("--camera is required, or --focal-35mm: ") + why);
@@ -195,7 +195,7 @@ int num_wanted(const FrameSource& source, const FlightOptions& options) {
   return options.max_frames > 0 ? std::min(some, options.max_frames) : some;
 }
 
-// Says that frames above the size that reconstruct takes as it is are tracked as they are.
+// Notes that large frames are tracked at full size, although `reconstruct` would make them smaller.
 void advise_on_size(Arguments& a, const tv_camera& camera) {
   if (a.has_resize || std::max(camera.width, camera.height) <= kLargeSide) return;
   a.common.note("frames above " + std::to_string(kLargeSide) +
@@ -470,7 +470,7 @@ std::string colmap_words(const ColmapFolder& colmap) {
   return " colmap/" + (pictures.empty() ? "" : " (" + pictures + ")");
 }
 
-// Pictures of an earlier run as the source of one that would replace them.
+// Throws BadInput where the source is the folder of pictures that this run would write.
 void refuse_own_pictures(const std::string& source, const fs::path& folder) {
   std::error_code ignored;
   if (fs::equivalent(source, folder / "colmap" / "images", ignored))

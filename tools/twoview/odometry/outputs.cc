@@ -164,8 +164,8 @@ std::string colmap_cameras(const tv_camera& c) {
   return text + "\n";
 }
 
-// Moves a pixel of one camera to where the other one, in the same place, has it; false where that
-// is outside its picture.
+// Maps a pixel of one camera to the pixel of another camera with the same pose; false where that is
+// outside its picture.
 bool moved(const tv_camera& from, const tv_camera& to, std::array<double, 2>& pixel) {
   double ray[3];
   return tv_camera_unproject(&from, pixel.data(), ray, nullptr) == TV_OK &&

@@ -59,8 +59,8 @@ nlohmann::ordered_json flight_json(const FlightResult& result);
 // trajectory.txt, or with `live` live.txt. A comment says where a segment begins.
 std::string trajectory_text(const Flight& flight, bool live);
 std::string keyframes_text(const FlightResult& result);
-// covariances.txt: of each keyframe relative to the one before it, where it is known; empty where
-// none is.
+// The text of covariances.txt: for each keyframe the covariance of its pose relative to the
+// keyframe before, where it is known. Empty where none is known.
 std::string covariances_text(const std::vector<FlightKeyframe>& keyframes);
 std::string frames_csv(const Flight& flight);
 // The words for a frame's reasons: those of the verdict, "unreadable" or "repeated".

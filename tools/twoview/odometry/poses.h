@@ -42,7 +42,8 @@ std::string tum_line(double time_s, const Pose& pose);
 struct TruePoses {
   Trajectory poses;
   double unit_s = 1;  // of the file's times, in seconds; 0: the file has no times (KITTI)
-  // The order of the quaternions where no line of names gives it: then it may be the other one.
+  // The order of the quaternions' numbers. kKnown: the file names its columns; else the order is
+  // assumed, and may be the other one.
   enum class Order { kKnown, kScalarLast, kScalarFirst } order = Order::kKnown;
   std::vector<std::string> notes;  // on what was left out, or is odd
 };

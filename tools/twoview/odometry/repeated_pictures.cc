@@ -6,12 +6,13 @@
 namespace cli {
 namespace {
 
-// Of the difference of the pictures before: below this share a picture is repeated. Measured
-// 2026-11-30: neighbours of eight sequences of video never fall below 0.34 of the pair before,
-// repeated pictures compressed by H.264 and MPEG-4 (but for key frames) lie at 0 to 0.14.
+// A picture is repeated if it differs from the one before by less than this share of the difference
+// of the two pictures before. Measured 2026-11-30: in eight sequences of video the share never
+// falls below 0.34; of repeated pictures compressed by H.264 and MPEG-4 it is 0 to 0.14, but for
+// key frames.
 constexpr double kRepeated = 0.2;
-// A new picture that differs from the one that was repeated by this share at once: the camera did
-// not begin to move just now.
+// The next new picture differs from the repeated one by at least this share of the usual step: the
+// camera had moved on while the picture was repeated, and did not begin to move just then.
 constexpr double kMovedOn = 0.5;
 constexpr double kEven = 0.5;  // of the usual step: below this share the newest one slows down
 constexpr size_t kSteps = 5;   // of which the median is usual, so that a flash is not

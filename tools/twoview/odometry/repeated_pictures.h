@@ -21,10 +21,10 @@ class RepeatedPictures {
   // Ends the sequence: what is repeated at its end counts as `stood`.
   void end();
 
-  // The frames whose picture stood while the camera moved on, in rising order, by what came so far:
-  // repeated ones, and those that an encoder stored anew among them.
+  // The frames, in ascending order, whose picture was repeated although the camera moved on, as far
+  // as is known yet. Pictures that an encoder stored anew between repeated ones are among them.
   const std::vector<size_t>& stood() const { return stood_; }
-  // Those that the camera saw standing still.
+  // The frames whose picture was repeated because the camera stood still.
   const std::vector<size_t>& waited() const { return waited_; }
 
  private:

@@ -18,8 +18,8 @@
 
 namespace cli {
 
-// --voxel, --max-memory, --measured-only, --depth-maps and those of the truth; the options that
-// were added.
+// Adds --voxel, --max-memory, --measured-only, --depth-maps and the options of the truth. Returns
+// the options that were added.
 std::vector<CLI::Option*> add_room_options(CLI::App& verb, RoomSettings& settings,
                                            RoomTruthOptions& truth);
 nlohmann::ordered_json room_options_json(const RoomSettings& settings,

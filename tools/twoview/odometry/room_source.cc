@@ -82,8 +82,8 @@ std::vector<Vector3> read_colmap_points(const std::string& path) {
   return points;
 }
 
-// The source's index of each frame whose pose frames.csv knows, with its time: the frames are every
-// K-th of the source.
+// For each frame that has a pose in frames.csv: its number in the source, where every K-th frame
+// was taken, and its time.
 std::map<std::string, std::pair<int, std::string>> frames_by_time(const std::string& path,
                                                                   int every) {
   std::map<std::string, std::pair<int, std::string>> frames;
@@ -120,7 +120,7 @@ SourceFrame first_frame(FrameSource& source, const std::set<int>& wanted) {
   return first;
 }
 
-// The camera by which the frames were tracked, for the pictures as the source gives them.
+// The camera with which the frames were tracked, for pictures of the size that the source has.
 tv_camera source_camera(const tv_camera& tracked, const cv::Size& size, int resize,
                         const std::string& what) {
   if (shrunk_size(size, resize) != cv::Size(tracked.width, tracked.height))
@@ -142,7 +142,7 @@ bool flag_of(const Json& options, const char* key) {
   return options.contains(key) && options[key].is_boolean() && options[key].get<bool>();
 }
 
-// The source turns its pictures as it did when the camera file was given.
+// Makes the source turn its pictures as it did for the tracking, when it was given the camera file.
 void fit_as_tracked(FrameSource& source, const std::string& camera_file) {
   if (camera_file.empty()) return;
   try {
@@ -228,7 +228,7 @@ RoomSource room_source_of_poses(const std::string& path, const std::string& pose
     source.fit(*given);
     made.files.push_back(camera_path(camera));
   }
-  // The frames' times. Those of a film are known only once it is read.
+  // The times of the frames. Those of a film are known only after the film is read.
   Trajectory frames;
   std::vector<int> indices;
   std::vector<double> times = source.times();

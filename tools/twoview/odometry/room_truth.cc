@@ -77,7 +77,7 @@ double spread_across(const std::vector<Vector3>& places) {
   return along > 0 ? std::sqrt(across / along) : 0;
 }
 
-// The rotation nearest to the mean of those between the poses.
+// The mean of the rotations from the poses `from` to the poses `to`, made a rotation again.
 Matrix3 mean_turn(const std::vector<Pose>& from, const std::vector<Pose>& to) {
   cv::Matx33d sum = cv::Matx33d::zeros();
   for (size_t i = 0; i < from.size(); ++i) {

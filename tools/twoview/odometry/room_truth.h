@@ -37,7 +37,7 @@ class TrueRoom {
   // Reads what the options name. Throws BadInput.
   explicit TrueRoom(const RoomTruthOptions& options);
   bool is_given() const { return !options_.mesh.empty() || !options_.depth.empty(); }
-  // That were read or will be, which no output may replace.
+  // The files of the truth, read or still to be read, which no output may replace.
   const std::vector<std::string>& files() const { return files_; }
 
   // The surface in its frame. A mesh needs the true path; pictures of depths that have none lie

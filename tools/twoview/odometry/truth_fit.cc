@@ -16,7 +16,8 @@ namespace {
 constexpr double kDegrees = 57.29577951308232;
 constexpr size_t kFewest = 3;  // poses of which a comparison is made
 
-// How many poses of the one have a pose of the other for themselves.
+// How many poses have a pose of the other trajectory near in time: counted in each trajectory, and
+// the smaller count.
 size_t num_met(const Trajectory& estimate, const Trajectory& truth) {
   std::set<size_t> own, others;
   for (const Association& pair : associated(estimate, truth)) {
@@ -26,7 +27,8 @@ size_t num_met(const Trajectory& estimate, const Trajectory& truth) {
   return std::min(own.size(), others.size());
 }
 
-// How many can meet: the fewer of those within the time that both have.
+// The most pairs of poses that are possible: within the times that both trajectories cover, the
+// number of poses of the one that has fewer.
 size_t num_that_could_meet(const Trajectory& a, const Trajectory& b) {
   const double begin = std::max(a.front().time_s, b.front().time_s);
   const double end = std::min(a.back().time_s, b.back().time_s);

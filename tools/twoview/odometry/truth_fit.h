@@ -12,7 +12,7 @@ namespace cli {
 // The clocks that a truth's times may follow.
 struct FrameClock {
   double film_start_s = 0;  // of the film's own clock
-  // Of each frame of the source that was used: its number from 0, its time and its name.
+  // For each frame of the source that was used: its number, from 0, its time and its name.
   std::vector<int> numbers;
   std::vector<double> times_s;
   std::vector<std::string> names;

@@ -72,7 +72,8 @@ std::string standing_words(const Steps& steps) {
   return text;
 }
 
-// Steps of the truth that are far longer than those around them and than the path's.
+// What is wrong where some steps of the truth are far longer than their neighbours and than the
+// path's.
 std::string jump_words(const Steps& steps) {
   constexpr size_t kAround = 5;
   size_t count = 0, longest = 0;
@@ -96,7 +97,8 @@ std::string jump_words(const Steps& steps) {
   return text;
 }
 
-// A truth whose way is far longer than that of the path that fits it best, as with noise.
+// What is wrong where the truth's path is far longer than the path that fits it best, as it is with
+// noise.
 std::string noise_words(const Steps& steps, const Accuracy& accuracy) {
   double own = 0;
   for (size_t i = 1; i < steps.path.size(); ++i)
@@ -218,7 +220,8 @@ std::vector<std::string> motion_doubts(const Trajectory& estimate, const Traject
     if (!words.empty()) doubts.push_back(words);
     return !words.empty();
   };
-  // A truth that stands jumps afterwards, and one that jumps is longer.
+  // A truth that stands still jumps afterwards, and one that jumps has a longer path: only the
+  // first of these faults is named.
   if (!add(standing_words(steps)) && !add(jump_words(steps))) add(noise_words(steps, accuracy));
   if (!add(plane_words(steps, accuracy))) add(lever_words(estimate, steps, accuracy));
   return doubts;

@@ -9,13 +9,14 @@
 
 namespace cli {
 
-// What one pair says (tv_evidence.principal_point_chi2).
+// The test of the principal point by one pair (tv_evidence.principal_point_chi2).
 struct ShiftEvidence {
   tv_camera camera;  // of both views
   double chi2, asked_px[2];
 };
 
-// What a pair's evidence says of its one camera, empty where it is not known.
+// The pair's test of the principal point; empty where both views are not of one camera or the test
+// was not made.
 std::optional<ShiftEvidence> shift_evidence(const tv_evidence& of_pair, const tv_camera& camera);
 
 struct CameraAdvice {

@@ -215,8 +215,8 @@ bool is_clearly_better(const std::vector<bool>& given, const std::vector<bool>& 
 
 namespace {
 
-// The reading by which the pictures agree with most of these matches, and clearly with more than
-// they do as given; else that of the file.
+// The way of reading the file in which the pictures agree with most of these matches, if with
+// clearly more than as the file is written; else the way that it is written.
 struct Best {
   Reading reading;
   size_t num_alike = 0;

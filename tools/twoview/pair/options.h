@@ -35,7 +35,8 @@ struct Options {
   int32_t resize = kByItself;
   bool was_large = false;  // kByItself made an image smaller
   bool min_threshold_given = false;
-  // Of both calibrations; below 0: what the camera file says.
+  // The standard deviations of the focal lengths and of the principal points of both cameras; below
+  // 0: those of the camera file.
   double focal_sigma = -1, center_sigma = -1;
   double principal_point_sigma = 0;  // above 0: the principal point may be refined
   Masks masks;                       // of the pictures whose corners are found

@@ -16,8 +16,9 @@ namespace cli {
 
 struct OwnMatchOptions {
   std::string path;  // of --matches; empty: the library finds the matches
-  // The longer side of the pictures that the other program matched, which were made smaller; 0: it
-  // matched them as they are; below 0: it is not said, and doubted where the matches look so.
+  // The longer side, in pixels, of the reduced pictures that the other program matched; 0: it
+  // matched the full pictures; below 0: not given, and the user is warned where the matches look
+  // reduced.
   int resize = -1;
 
   bool given() const { return !path.empty(); }

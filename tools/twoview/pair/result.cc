@@ -64,7 +64,7 @@ const Phrase kFocalLength = {TV_REASON_LOW_PARALLAX,
                              "calibrate the camera (twoview calibrate)"};
 constexpr double kMuchParallaxRad = 2 / kDegrees;
 
-// The advice of these where it is the focal length that was given, and not a camera file.
+// The advice for these reasons where a focal length was given in place of a camera file.
 constexpr const char* kNoFileFewAgree =
     "take pictures with more overlap, from a similar distance and at the same zoom; check that the "
     "focal length is theirs and that none is mirrored";

@@ -40,7 +40,8 @@ struct Outcome {
   tv_camera camera[2]{};
   tv_two_view two_view{};
   tv_evidence evidence{};
-  // Its arrays are in the context's memory until its next call, or in `own`.
+  // The arrays that it points to lie in the context's memory, valid until the context's next call,
+  // or in `own`.
   tv_reconstruction reconstruction{};
   OwnArrays own;
   std::optional<std::vector<tv_dense_point>> dense;  // empty without --dense or a full pose

@@ -206,7 +206,8 @@ nlohmann::ordered_json play_vehicle(const std::string& folder, LinkListener list
   // After the last entry the session goes on until no frame waits for its attitude.
   while (!stop) {
     int64_t next = playback.next_ns();
-    // A frame that is due and was not taken waits behind others: it is tried again later.
+    // A frame whose time has come but that was not taken, because earlier ones are not taken yet,
+    // is tried again later.
     if (next <= playback.now_ns) next = playback.now_ns + 5 * kMs;
     if (duration_s > 0 && next != INT64_MAX && static_cast<double>(next - begin) > duration_s * 1e9)
       break;

@@ -36,7 +36,7 @@ double cpu_ms() {
   return 1e3 * static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_nsec);
 }
 
-// The number with two digits, which is what a scene says of a voxel that fits.
+// The number rounded to two digits, as scenes state the size of a voxel that fits them.
 double two_digits(double value) {
   const double unit = std::pow(10.0, std::floor(std::log10(value)) - 1);
   return std::round(value / unit) * unit;
@@ -51,7 +51,7 @@ RoomScene with_small_pictures(RoomScene scene) {
   return scene;
 }
 
-// A copy, of its own memory, at that size.
+// The picture at the size of this camera, in memory of its own.
 cv::Mat small_copy(const cv::Mat& picture, const tv_camera& camera, int interpolation) {
   const cv::Size size(camera.width, camera.height);
   cv::Mat copy;
@@ -235,7 +235,8 @@ void RoomBuilder::find_up(RoomModel& model) const {
   for (const RoomView& view : scene_.views) held.push_back(view.R);
   model.up = up_of_cameras(held);
   model.up_source = "cameras";
-  // Floor, ceiling and tables say it better where they were measured.
+  // Where planes nearly across that direction were measured (floor, ceiling, tables), they
+  // determine "up" more precisely.
   constexpr double kMostCosine = 0.94;  // of 20 degrees
   Vector3 level{0, 0, 0};
   for (const tv_room_plane& plane : model.planes) {

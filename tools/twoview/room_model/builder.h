@@ -24,7 +24,7 @@ class RoomBuilder {
 
   size_t num_keyframes() const { return jobs_.size(); }
   size_t num_done() const { return next_job_; }
-  // As it was given, but for the camera, which is that of pictures that are scaled down.
+  // The scene as it was given, but its camera is that of the pictures after they were scaled down.
   const RoomScene& scene() const { return scene_; }
   // Of the pictures as they are given.
   cv::Size picture_size() const { return picture_size_; }

@@ -26,7 +26,7 @@ struct MapPixels {
   std::vector<uint8_t> shown;  // 0 where the picture shows nothing of the scene
 };
 
-// A map, of whose pixels without a distance only the colours take memory.
+// A depth map that stores, for pixels without a distance, their colours only.
 class KnownPixels {
  public:
   explicit KnownPixels(const MapPixels& pixels);
@@ -66,7 +66,8 @@ class DepthSweep {
 
  private:
   size_t tile_of(size_t pixel) const;
-  // 0 where the map lies beyond the picture, whose lens bends its edge inwards, or on its mask's 0.
+  // For each pixel of the map whether the picture shows it: 0 where the lens leaves the map's edge
+  // outside the picture, or where the mask is 0.
   cv::Mat shown_by(const RoomPicture& picture) const;
   void bring_to_map(const cv::Mat& picture, cv::Mat& out, int interpolation) const;
 

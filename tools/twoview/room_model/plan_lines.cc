@@ -74,7 +74,7 @@ double away_from(const Piece& piece, const Upright& v) {
   return piece.normal.dot(v.at) - piece.offset;
 }
 
-// Gives each plane its vertices: a vertex is of the nearest one only.
+// Assigns the vertices to planes: each vertex belongs to the nearest plane only.
 void find_places(const std::vector<Upright>& surface, double voxel, std::vector<Piece>& planes) {
   for (const Upright& v : surface) {
     double nearest = kNearVoxels * voxel;
@@ -87,8 +87,8 @@ void find_places(const std::vector<Upright>& surface, double voxel, std::vector<
   }
 }
 
-// Moves a piece to its vertices by least squares. Its direction is one of the room's own where it
-// agrees with that.
+// Fits a piece to its vertices by least squares. Where the fitted direction agrees with an axis of
+// the room, the piece takes that of the axis.
 void fit(double voxel, Piece& piece) {
   const double count = static_cast<double>(piece.places.size());
   const cv::Point2d direction = piece.direction();
@@ -236,7 +236,8 @@ class Raster {
   cv::Mat counts_;
 };
 
-// Takes what lies on a piece, or is its blur; `places` become those that lie on it.
+// Takes from the surface the vertices that lie on a piece and those that are its blur; `places`
+// becomes those that lie on it.
 void take(double voxel, std::vector<Upright>& surface, Piece& piece, Raster* raster) {
   const double reach = std::max((kNearVoxels + 1) * voxel, kAgreeSigmas * piece.sigma);
   piece.places.clear();
@@ -263,8 +264,8 @@ void add_fronts(const cv::Point2d& normal, double voxel, std::vector<Upright>& s
   }
 }
 
-// The directions that fronts face: along the room's axes, and those of planes that are turned from
-// them.
+// The directions that fronts of furniture may face: the room's axes, and the normals of planes that
+// are at an angle to them.
 std::vector<cv::Point2d> directions_of(const std::vector<Piece>& planes) {
   constexpr double kTurnedCosine = 0.985;  // 10 degrees
   std::vector<cv::Point2d> found = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}};
@@ -290,7 +291,7 @@ bool are_one(const Piece& a, const Piece& b, double voxel) {
   return apart <= kAgreeSigmas * std::hypot(a.sigma, b.sigma);
 }
 
-// One piece of two, of the direction of the one that is known better.
+// Joins two pieces into one, which takes the direction of the one that is known more precisely.
 Piece joined(const Piece& a, const Piece& b, double voxel) {
   Piece one = a.sigma_turn < b.sigma_turn ? a : b;
   one.is_wall = a.is_wall || b.is_wall;
@@ -380,7 +381,8 @@ PlanLine line_of(const Piece& piece, double begin, double end, bool is_carried) 
   return line;
 }
 
-// Parts of one wall between which nothing was seen: what stands before it hides it there.
+// Adds the parts of a wall between two measured parts where nothing was seen because something
+// stands in front.
 void add_hidden_parts(const RoomModel& model, const std::vector<Piece>& pieces,
                       std::vector<PlanLine>& lines) {
   for (const Piece& piece : pieces) {

@@ -12,7 +12,8 @@ namespace cli {
 namespace {
 
 constexpr size_t kMostViews = 60;
-// A view is matched with those so many before it: near ones see the same, far ones from elsewhere.
+// A view is matched with the views so many places before it: near ones see much in common, far ones
+// give a longer baseline.
 constexpr size_t kBack[] = {1, 2, 4, 8};
 constexpr float kLeastAngle = 0.03f;  // radians between the rays: 1.7 degrees
 constexpr size_t kFewestPairs = 3;    // of pictures that confirm each other

@@ -18,7 +18,8 @@ constexpr size_t kRoomBytes = size_t{8} << 20;  // 7,600 blocks
 constexpr int kMostMoves = 8;                   // of maps in one settle()
 constexpr int32_t kFewestMaps = 2;              // that must have seen a surface
 constexpr double kMostSigmaVoxels = 1.5;
-// A unit that has changed by more asks for other voxels.
+// If the map's unit has changed by more than this factor, the room is made again with voxels of
+// another size.
 constexpr double kMostScale = 1.25;
 
 tv_depth_options sweep_options() {

@@ -47,11 +47,11 @@ class RoomPreview {
   // Fuses the depth map of one more keyframe. `places`: of all keyframes so far and of this one, in
   // the order in which they came. Throws BadInput where no depth map can be made.
   void add(const PreviewKey& key, const std::vector<PreviewPlace>& places);
-  // Moves some of the maps whose keyframes have moved by more than half a voxel, at most so many
-  // that it takes about as long as `add`. Whether more of them are left.
+  // Fuses some of the maps anew whose keyframes have moved by more than half a voxel: as many as
+  // take about the time of one `add`. Returns whether more are left.
   bool settle();
   size_t num_keyframes() const { return maps_.size(); }
-  // The surface as surface_bytes() has it.
+  // The surface in the format of surface_bytes().
   std::string surface();
 
  private:

@@ -1,4 +1,4 @@
-// Triangles in a tree of boxes, which says what of them is nearest to a point, and what stands
+// Triangles in a tree of boxes, which finds the triangle nearest to a point, and whether one lies
 // between two points.
 #pragma once
 

@@ -31,8 +31,8 @@ std::optional<double> median_if_any(std::vector<double> values) {
   return median_of(std::move(values));
 }
 
-// Calls visit(i, x, y) for the places[i], of those that `todo` names, that a camera shows at the
-// pixel (x, y).
+// Calls visit(i, x, y) for each i in `todo` whose point places[i] the camera sees, at the pixel (x,
+// y).
 template <typename Visit>
 void for_shown(const tv_camera& camera, const Matrix3& R, const Vector3& t,
                const std::vector<Vector3>& places, const std::vector<size_t>& todo,

@@ -36,7 +36,8 @@ void silence_decoders() { ::setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0); }
 bool open_capture(cv::VideoCapture& film, const std::string& path) {
   silence_decoders();
   try {
-    // By FFmpeg where OpenCV has it: other backends give positions of the next picture.
+    // FFmpeg's backend is preferred: the other backends of OpenCV report the position of the next
+    // picture.
     if (!film.open(path, cv::CAP_FFMPEG) && !film.open(path)) return false;
   } catch (const cv::Exception&) {
     return false;
@@ -126,7 +127,7 @@ void Film::State::add_interval(double interval_s) {
       facts.longest_s - facts.shortest_s > std::max(kRounding_s, kSteadyShare * facts.shortest_s);
 }
 
-// Without the pauses in which the clock began anew.
+// The mean interval between pictures, without the intervals in which the film's clock began anew.
 double Film::State::mean_interval_s() const {
   const int64_t num_anew = clock.num_begun_anew(), num = num_pictures - 1 - num_anew;
   const double seconds = time_s - static_cast<double>(num_anew) * StreamClock::kPause_s;

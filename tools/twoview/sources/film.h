@@ -59,8 +59,9 @@ class Film {
   // whose time is not later than that of the one before is left out, and counted, but where the
   // clock began anew (sources/stream_clock.h); so is one of another size than the header says.
   bool next();
-  // Of the picture that next() went to. The index counts those that were left out, too; the time
-  // is in seconds since the first picture; the picture is empty where it does not decode.
+  // About the picture that next() read last: its index, which counts pictures that were left out,
+  // too; its time in seconds since the first picture; and the picture, empty where it could not be
+  // decoded.
   int64_t index() const;
   double time_s() const;
   bool began_anew() const;  // the clock, before this picture

@@ -169,8 +169,8 @@ FilmContainer read_film_container(const std::string& path) {
   result.width = pictures->codecpar->width;
   result.height = pictures->codecpar->height;
   result.num_pictures = std::max<int64_t>(0, pictures->nb_frames);
-  // Of a raw stream, and of JPEG pictures in a zip, which it takes for one, libavformat may count
-  // times of its own.
+  // For a raw stream, and for JPEG pictures in a zip, which libavformat takes for a raw stream,
+  // libavformat may invent times by counting.
   const bool is_raw = (film->iformat->flags & AVFMT_NOTIMESTAMPS) != 0;
   result.has_clock = !is_raw && has_times(*film, *pictures);
   result.rate_hz = positive(pictures->avg_frame_rate);

@@ -16,13 +16,14 @@ class StreamClock {
  public:
   static constexpr double kPause_s = 1;  // longer than the pauses over which a motion is continued
 
-  // The time of the next picture, from what its clock says; empty where it is left out.
+  // The time to give the next picture when the stream's clock says clock_s; empty where the picture
+  // is to be left out.
   std::optional<double> next(double clock_s);
   // Whether the clock began anew before the picture that next() was last called for.
   bool began_anew() const { return began_anew_; }
   int64_t num_left_out() const { return num_left_out_; }
   int64_t num_begun_anew() const { return num_begun_anew_; }
-  // What the user must know, such as "the clock of the film begins anew at 3.0 s"; empty where the
+  // A line for the user, such as "the clock of the film begins anew at 3.0 s"; empty where the
   // clock never did. whose: such as "the film".
   std::string note(const std::string& whose) const;
 

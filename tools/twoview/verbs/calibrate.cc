@@ -85,7 +85,8 @@ std::string reasons_text(const std::vector<BoardView>& views) {
   return text.empty() ? text : " (" + text + ")";
 }
 
-// The size of the other board that was found in most views, and the number of those views.
+// The size, other than the given one, of the board that was found in most views, and in how many
+// views.
 std::pair<cv::Size, int> other_board(const std::vector<BoardView>& views) {
   std::map<std::pair<int, int>, int> counts;
   for (const BoardView& view : views)
@@ -125,8 +126,8 @@ void require_views(const std::vector<BoardView>& views, const Arguments& a) {
                  ": at least 3 are needed, 15 are better, each tilted another way");
 }
 
-// Notes that some views were left out because a larger board is in them: a part of it was then
-// found in the others, and served.
+// Notes that views were left out because they show a larger board than the others do: in the others
+// a part of that board was found and used.
 void note_larger_board(const std::vector<BoardView>& views, Common& common) {
   const auto [seen, times] = other_board(views);
   const size_t num_left_out = count_of(views, Reason::kOtherBoard);

@@ -26,8 +26,8 @@ struct Common {
   // Returns true if the summary for the user is printed to stdout.
   bool speaks() const { return !json && !quiet; }
   void note(const std::string& text);
-  // The notes as lines of the summary. Where none is printed, they go to stderr, and the result is
-  // empty.
+  // The notes as lines of the printed summary. Where no summary is printed (--json, --quiet),
+  // writes the notes to stderr and returns an empty text.
   std::string note_lines() const;
 };
 void add_common(CLI::App& verb, Common& common, unsigned groups, const std::string& output_help);

@@ -60,8 +60,8 @@ struct PairReport {
   bool has_truth = false;
   Errors errors;
   std::vector<Errors> own_errors;  // of the systems of --poses, in their order
-  // The same against the list's pose as it may have been meant (pair/pose_readings.h), of twoview
-  // where its verdict is ok; against its inverse of the other systems.
+  // The errors against another reading of the list's pose: of twoview, where its verdict is ok
+  // (pair/pose_readings.h); of the systems of --poses, against the inverse pose.
   std::vector<Errors> reading_errors;
   std::vector<Errors> own_inverse_errors;
   bool truth_stands = false;           // the list's pose has no translation
@@ -484,8 +484,8 @@ Cameras load_cameras(Arguments& a) {
   return cameras;
 }
 
-// Whether most poses fit another reading of the list's, and not the list's as they stand; the
-// number of those that do, else 0. of_report: the errors against both.
+// The number of poses that fit another reading of the list's poses and not the list as it is
+// written, if these are more than half; else 0. of_report: the errors against both readings.
 template <typename OfReport>
 size_t num_of_other_reading(const std::vector<PairReport>& reports, const OfReport& of_report) {
   size_t count = 0, num_other = 0;
@@ -498,8 +498,8 @@ size_t num_of_other_reading(const std::vector<PairReport>& reports, const OfRepo
   return 2 * num_other > count ? num_other : 0;
 }
 
-// Notes true poses without a translation, and those that most poses contradict: of real pairs 3.2 %
-// of those that are ok lie beyond three of their standard deviations.
+// Notes true poses that have no translation, and lists of true poses that most estimates
+// contradict. Of real pairs with the verdict ok, 3.2 % lie beyond three standard deviations.
 void note_contradictions(const std::vector<PairReport>& reports, const std::string& list,
                          Common& common) {
   const auto count = [&](const auto& is_counted) {
@@ -519,7 +519,8 @@ void note_contradictions(const std::vector<PairReport>& reports, const std::stri
               list + ": are its poses those of the cameras, and of these pictures?");
 }
 
-// Notes where poses fit the list's in another reading, such as those of the other direction.
+// Notes where the estimates fit the list's poses only if these are read in another way, such as in
+// the other direction.
 void note_readings(const std::vector<OwnPoses>& systems, const std::vector<PairReport>& reports,
                    const std::string& list, Common& common) {
   const std::vector<PairReading> readings = other_readings({1, 0, 0, 0, 1, 0, 0, 0, 1}, {0, 0, 1});

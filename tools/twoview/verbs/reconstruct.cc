@@ -93,7 +93,7 @@ void estimate_unknown_cameras(Arguments& a, const Picture pictures[2], ImageCame
                 "--camera is better");
 }
 
-// The keys that say the focal length itself.
+// Adds the keys of result.json about the estimated focal length.
 void add_estimated_focal_length(const Outcome& outcome, nlohmann::ordered_json& json) {
   const tv_two_view& v = outcome.two_view;
   const tv_camera& start = outcome.camera[0];

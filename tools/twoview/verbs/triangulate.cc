@@ -126,7 +126,7 @@ ImageCameras matched_cameras(Arguments& a, const KnownPose& pose) {
   if (!note.empty()) a.common.note(note);
   for (ImageCamera& camera : cameras) {
     Options& options = a.common.options;
-    // Without the images only --resize itself says that they were made smaller.
+    // Where no images are given, only --resize says by how much they were made smaller.
     const int longer = a.images.empty()
                            ? std::max(options.resize, 0)
                            : options.longer_side(camera.camera.width, camera.camera.height);
@@ -182,7 +182,7 @@ void require_direction(const Arguments& a, const Pose3& pose, const ShareOf& sha
                      std::to_string(std::lround(100 * other)) + " % if R and t " + reading.words);
 }
 
-// The pose that the matches ask for by themselves; empty where they determine none.
+// The pose that is estimated from the matches alone; empty where they do not determine one.
 std::optional<Pose3> free_pose(const Arguments& a, const tv_pixel_pairs& pixels,
                                const tv_camera& camera0, const tv_camera& camera1) {
   Session session(a.common.options);

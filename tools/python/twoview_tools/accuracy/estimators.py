@@ -9,7 +9,8 @@ import numpy as np
 
 from . import datasets
 
-# The confidence of every estimator, and the most samples that each but OpenGV may draw.
+# The confidence that every estimator is given, and the limit of samples for each of them but
+# OpenGV.
 CONFIDENCE = 0.9999
 MAX_ITERATIONS = 10000
 # OpenGV's own default; with ten times as many it took longer than all other peers

@@ -378,7 +378,7 @@ class Importer:
         """What turns the attitudes' world and body: FLIP for ROS's axes (z up), the identity where
         z is down, None where the accelerations contradict both."""
         rows = rows[(rows[:, 9] != -1) & np.isfinite(rows[:, 6:9]).all(1)]
-        # Their mean, in the world.
+        # The mean acceleration, in the world's frame.
         gravity = np.einsum("nij,nj->i", rotations_of(rows[:, :4]), rows[:, 6:9])
         length = np.linalg.norm(gravity)
         if length == 0:

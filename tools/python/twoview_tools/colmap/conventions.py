@@ -38,7 +38,8 @@ class ColmapCamera:
     params: tuple
 
 
-# The numbers of COLMAP 3.8's models and of those that later versions added.
+# COLMAP's numbers of its camera models: those of version 3.8, and those of the models that later
+# versions added.
 MODEL_IDS = {name: number for number, name in enumerate((
     "SIMPLE_PINHOLE", "PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "OPENCV_FISHEYE",
     "FULL_OPENCV", "FOV", "SIMPLE_RADIAL_FISHEYE", "RADIAL_FISHEYE", "THIN_PRISM_FISHEYE",
