@@ -11,8 +11,8 @@
 
 namespace tv {
 
-// Two doubles, of which each operation is the same IEEE operation on each: every CPU of the library
-// that has vectors of doubles has those of 16 bytes.
+// Two doubles; an operation on a Pair is the same IEEE operation on each of them. All CPUs of the
+// library that have vectors of doubles have vectors of 16 bytes.
 typedef double Pair __attribute__((vector_size(16)));
 
 inline constexpr int kBlock = 6;
@@ -31,7 +31,7 @@ struct BlockMatrix {
 // Uninitialised. A smaller num_blocks may be set afterwards.
 BlockMatrix block_matrix(int num_blocks, const tvk_odometry_table* kernels, Arena& arena);
 
-// How many entries so many rows of blocks have.
+// The number of entries of this many rows of blocks.
 inline size_t block_entries(int num_blocks) {
   const size_t n = static_cast<size_t>(num_blocks);
   return kBlock * kBlock * (n * (n + 1) / 2);

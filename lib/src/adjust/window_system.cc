@@ -82,7 +82,8 @@ void keep_near(const Window& window, const WindowPose* pose, const WindowPoint& 
   for (int i = 0; i < 3; ++i) X[i] += less * ray[i];
 }
 
-// Whether a point is as far away as it may go, but for a tenth of the square.
+// Whether a point is as far away as it may go: its squared distance is at least nine tenths of the
+// largest one.
 bool is_far(const Window& window, const WindowPose* pose, const WindowPoint& point,
             const double ray[3]) {
   const double ray_sq = length_sq_of(ray);

@@ -40,7 +40,7 @@ tv_status make_plan(const tv_camera* camera, const tv_odometry_options* options,
   return TV_OK;
 }
 
-// Each argument of a frame has a status of its own.
+// Checks each argument of a frame; each has its own status.
 tv_status check_frame_image(const tv_odometry& odometry, const tv_image& image) {
   const tv_status status = check_camera_image(odometry.camera.model, image);
   return status == TV_ERR_ARGUMENT ? TV_ERR_STRIDE : status;

@@ -51,7 +51,7 @@ tv_status read_sized(const void* object, size_t known_size, void* checked) {
   const size_t size = smaller(known_size, size_of(object));
   const uint32_t own = static_cast<uint32_t>(known_size);
   std::memcpy(checked, object, size);
-  // struct_size becomes that of this library, so that *checked may be passed to another call.
+  // struct_size is set to that of this library, so that *checked may be passed to another call.
   std::memcpy(checked, &own, sizeof own);
   return TV_OK;
 }

@@ -52,8 +52,8 @@ struct Radial {
 Radial brown_radial(const double k[8], double u) {
   const double numerator = 1.0 + u * (k[0] + u * (k[1] + u * k[4]));
   const double d_numerator = k[0] + u * (2.0 * k[1] + u * (3.0 * k[4]));
-  // Without a denominator nothing is divided. The product with 0 keeps a numerator that is not
-  // finite as it would be with one: no number.
+  // Without a denominator there is no division. The product with 0 turns a numerator that is not
+  // finite into no number, as the division would.
   if (k[5] == 0.0 && k[6] == 0.0 && k[7] == 0.0) return {numerator, d_numerator - numerator * 0.0};
   const double denominator = 1.0 + u * (k[5] + u * (k[6] + u * k[7]));
   const double d_denominator = k[5] + u * (2.0 * k[6] + u * (3.0 * k[7]));

@@ -38,7 +38,7 @@ double add_up(SumsKernel kernel, int num_sums, const RayPairs& pairs, const int3
   return cauchy ? cost : over_lanes(sums[num_sums - 2]);
 }
 
-// Without a loop, whose additions would wait for one another.
+// Written without a loop, in which each addition would wait for the one before.
 double dot9(const double* a, const double* b) {
   return (((((((a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]) + a[3] * b[3]) + a[4] * b[4]) +
             a[5] * b[5]) +

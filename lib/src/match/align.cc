@@ -169,7 +169,7 @@ Linear turned(double angle_rad, double step) {
   return Linear{{step * cosine, -step * sine, step * sine, step * cosine}};
 }
 
-// step times what maps one patch's shape to the other's.
+// The map from the shape of one patch to the shape of the other, times `step`.
 Linear between(const double from[4], const double to[4], double step) {
   const double scale = step / (from[0] * from[3] - from[1] * from[2]);
   return Linear{

@@ -223,7 +223,7 @@ int32_t nearest_second(const Query& query, int32_t from, int32_t second) {
   return nearest.dist;
 }
 
-// The list of the column of that rank.
+// Copies the list that belongs to the column of this rank.
 void copy_list(const tvk_nearest_lists* of_columns, int32_t rank, tvk_nearest* list) {
   const tvk_nearest_lists& lists = of_columns[TVK_NEAREST_NUMBER(rank)];
   for (int k = 0; k < TVK_NEAREST_LIST; ++k) {

@@ -149,9 +149,9 @@ bool adjust_segment(Odometry* odometry, int32_t segment, int32_t first_id, int32
   Map& map = odometry->map;
   MapWindow window = make_map_window(*odometry, sizes_of(odometry->options), arena);
   const int32_t first = first_from(map, first_id);
-  // From the first keyframe on, none is held where gravity is known (else adjust_window holds the
-  // first one): one that is can only come to where it belongs when all others move, which the steps
-  // do last.
+  // With a known gravity no keyframe is held from the first one on (without it, adjust_window holds
+  // the first one): a held keyframe could only reach its place by a motion of all others, which the
+  // adjustment's steps find last.
   if (!add_keyframes(map, segment, first, map.num_keyframes, 1, false, &window)) return false;
   const int32_t num_free = window.model.num_views;
   if (!add_keyframes(map, segment, 0, first, kHeldOneIn, true, &window)) return false;

@@ -66,7 +66,8 @@ void correct_camera(Odometry* odometry, Frame* frame) {
   // The chi-square of the pairs' principal points about their common estimate, divided by its
   // degrees of freedom.
   const double scatter = std::max((e->square - gain) / (2 * (e->num_pairs - 1)), 1.0);
-  // Many pairs make a small bias of all of them significant: each must gain as much as its noise.
+  // A small common bias becomes significant with many pairs; so the gain must exceed that of the
+  // noise of each pair.
   const double least = std::max(kLeastGain, static_cast<double>(e->num_pairs));
   const tv_camera &now = odometry->camera.model, &given = odometry->given_camera;
   const double from[2] = {now.cx, now.cy};

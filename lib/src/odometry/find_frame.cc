@@ -14,7 +14,7 @@ namespace {
 constexpr int32_t kLeastInliers = 20, kLeastRelocated = 30;
 constexpr int32_t kSearchedKeyframes = 6;  // in which a lost frame is looked for, a frame
 
-// The pose from the points that are looked for around a predicted pose.
+// Finds the frame's pose from points that are looked for near where the predicted pose puts them.
 bool track_points(Odometry* odometry, const int32_t* points, int32_t num, const Rigid& predicted,
                   double radius_px, Frame* frame, PoseFit* fit) {
   const PointSearch search{points, num, predicted, radius_px, true};
@@ -28,8 +28,8 @@ bool track_points(Odometry* odometry, const int32_t* points, int32_t num, const 
   return true;
 }
 
-// The pose is known to a few pixels: looks for all points once more, near where they must be, and
-// counts them as looked for if `counts`.
+// With a pose that is known to a few pixels: looks for all points again, close to their predicted
+// places. If `counts`, the points' counts of searches and finds are raised.
 bool refine_track(Odometry* odometry, bool counts, Frame* frame, PoseFit* fit) {
   const PointSearch search{odometry->local_points, odometry->num_local_points, fit->cam_from_world,
                            5.0, counts};

@@ -168,9 +168,9 @@ bool meets(Odometry* odometry, const Frame& frame, double path, int32_t keyframe
     again->cam_from_world = fit.cam_from_world;
     if (!refine_pose(odometry, 3.0, again, &fit)) return false;
   }
-  // What was found without the map's help decides. The points around are looked for all the same,
-  // whatever it says: those that are here twice, because the frame sees newer ones in their places,
-  // are found in no other frame, and go.
+  // The inliers that were found without the map's help decide about the loop. The points around are
+  // searched in any case: old copies of points, which the frame sees as newer points, are then
+  // found in no frame and are removed.
   const int32_t num_inliers = fit.estimate.num_inliers;
   const bool is_sure = fit.estimate.verdict == TV_VERDICT_OK;
   int32_t* around =

@@ -238,9 +238,9 @@ struct Base {
   int32_t point_id, keyframe_id, segment, frame;
 };
 
-// What reads the parts of a map's bytes after their header, in this order, and adds them to `map`
-// if there is room for the places of its points in `places`; null: they are only checked. False: it
-// is no map.
+// Reads the parts of a map's bytes that follow the header, in this order. `places` has room for the
+// places of the points, and what is read is added to `map`; with a null `places` the bytes are only
+// checked. False: the bytes are no map.
 struct BodyReader {
   const Header& h;
   Stream* s;

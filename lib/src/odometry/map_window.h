@@ -49,9 +49,10 @@ bool adjust_map_window(const Odometry& odometry, MapWindow* window, Arena& arena
 // The pose of a view of the window.
 Rigid pose_of(const MapWindow& window, int32_t view);
 
-// The map takes over the positions of the points.
+// Copies the adjusted positions of the points to the map.
 void keep_positions(const MapWindow& window, Map* map);
-// The map forgets the observations that do not fit, and knows how uncertain the points' depths are.
+// Removes the observations that do not fit from the map, and stores how uncertain the points'
+// depths are.
 void drop_outliers(const MapWindow& window, Odometry* odometry);
 
 }  // namespace tv

@@ -8,7 +8,7 @@
 namespace tv {
 namespace {
 
-// So many times the keypoints of a frame are points of the map that one frame is matched with.
+// One frame is matched with at most this many times as many points of the map as it has keypoints.
 constexpr int32_t kMatchedFrames = 3;
 constexpr size_t kOdometryBytes = 4096;  // with 64-bit and with 32-bit pointers alike
 static_assert(sizeof(Odometry) <= kOdometryBytes);

@@ -34,7 +34,7 @@ constexpr double kLargestMeasure = 1e7;  // metres, metres per second: above it,
 
 bool is_usable(double sigma) { return sigma >= 1 / kLargestMeasure && sigma <= kLargestMeasure; }
 
-// The map's unit becomes `scale` of what it was.
+// Changes the unit of the map to `scale` times the old unit.
 void rescale(Odometry* odometry, double scale, Frame* frame) {
   Map& map = odometry->map;
   for (int32_t k = 0; k < map.num_keyframes; ++k) {
@@ -78,16 +78,16 @@ void add_evidence(const ScaleEvidence& more, ScaleEvidence* evidence) {
   evidence->num += more.num;
 }
 
-// The map's unit became 1 / factor of what it was.
+// Adapts the evidence to a unit of the map that is 1 / factor of the old one.
 void stretch(double factor, ScaleEvidence* evidence) {
   evidence->product *= factor;
   evidence->square *= factor * factor;
   evidence->noise *= factor * factor;
 }
 
-// Adds what the way from the keyframe before says of the segment's scale, by least squares of the
-// sensors' way = scale way. Where the camera was lost in between, the way is as good as the pose
-// that it was found with, and says nothing.
+// Adds the evidence on the segment's scale from the way since the keyframe before, by least squares
+// of the sensors' way = scale x map's way. If the camera was lost in between, the map's way is only
+// as good as the pose at which it was found, and is not used.
 void add_way(Odometry* odometry, int32_t keyframe) {
   const MapKeyframe& own = odometry->map.keyframes[keyframe];
   const MapKeyframe& before = odometry->map.keyframes[keyframe - 1];
@@ -331,7 +331,8 @@ void change_scale(Odometry* odometry, int32_t from, int32_t to) {
     odometry->other_segment = from;
   }
   if (!is_known) odometry->scale = MetricScale{};
-  // The sensors that contradict each other are the same in every segment.
+  // The sensors are the same in every segment, so that a contradiction between them counts in the
+  // next one, too.
   if (was_contradicted) {
     odometry->scale.is_contradicted = true;
     odometry->scale.source = TV_SCALE_UNIT;

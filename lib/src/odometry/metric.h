@@ -20,7 +20,8 @@ void begin_travel(Odometry* odometry, const Rigid& cam_from_world, int32_t keyfr
 // Whether the way of the map since the travel began is another one than that of the velocities.
 bool is_contrary(const Odometry& odometry, const Frame& frame);
 
-// What the sensors say of a frame.
+// Stores what the frame's sensors measured, for the test whether a later frame can have been
+// reached.
 void measure_reach(const Odometry& odometry, const Frame& frame, Reach* reach);
 
 // Adds the longest way that the camera may have gone since the frame before to most_m: by its
@@ -34,7 +35,8 @@ bool is_reachable(const Odometry& odometry, const Frame& frame);
 // makes the metre the unit of the segment once the scale is known to 10 %.
 void measure_scale(Odometry* odometry, Frame* frame);
 
-// Sums up what the ways between the segment's keyframes, as they are now, say of the scale.
+// Computes the evidence on the scale anew, from the ways between the segment's keyframes as they
+// lie now.
 void gather_ways(Odometry* odometry);
 
 // An estimate of the scale from evidence: product / square is the scale, and 1 / square its
@@ -55,12 +57,12 @@ MetricScale scale_of(const ScaleEstimate& estimate, int32_t source, double sigma
 // segment is `scale` units of the tracked one.
 void join_scale(const MetricScale& other, double scale, Odometry* odometry);
 
-// Keeps what is known of the scale of the segment `from`, and takes up what is known of that of
+// Stores the evidence on the scale of the segment `from`, and continues with that of the segment
 // `to`.
 void change_scale(Odometry* odometry, int32_t from, int32_t to);
 
-// The frames that follow belong to this segment: whether it is upright is read from the map, and
-// what is known of its scale is taken up.
+// Makes the segment the one of the frames that follow: sets whether it is upright, and continues
+// with its evidence on the scale.
 void enter_segment(Odometry* odometry, int32_t segment);
 
 }  // namespace tv

@@ -52,7 +52,7 @@ struct MapCheck {
   MapVote vote;
 };
 
-// The newest keyframe until its surroundings are adjusted.
+// The newest keyframe, as long as its points are not all made and its surroundings not adjusted.
 struct UnfinishedKeyframe {
   int32_t id;              // -1: it is adjusted
   int32_t next_neighbour;  // the first one with which no points were made yet

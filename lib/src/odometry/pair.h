@@ -1,5 +1,5 @@
-// Two frames or keyframes by themselves: what their own matches say of the motion between them,
-// without the map.
+// Pairs of frames or keyframes: the motion between the two by their own matches, independent of the
+// map.
 #pragma once
 
 #include "odometry/odometry.h"

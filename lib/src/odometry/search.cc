@@ -40,7 +40,7 @@ void make_grid(const Odometry& odometry, Frame* frame) {
     // Counts each cell's end down to its start.
     frame->cell_items[--frame->cell_starts[frame->distances[k] + 1]] = k;
   }
-  // Each start now lies one cell too far on.
+  // The starts are one cell too far on now, and are moved back.
   for (int32_t c = 0; c < cells; ++c) frame->cell_starts[c] = frame->cell_starts[c + 1];
   frame->cell_starts[cells] = frame->num;
   forget_points(frame);

@@ -53,11 +53,12 @@ void drop_start(Odometry* odometry, int n) {
   odometry->starts[--odometry->num_starts] = dropped;
 }
 
-// The two frames as the first keyframes of a segment. False, and no keyframe was made, where too
-// few points lie between them.
+// Makes the two frames the first keyframes of a segment, with points. Returns false, and makes
+// none, where too few points can be made.
 bool make_first_points(Odometry* odometry, Frame* frame0, Frame* frame, const Pair& pair) {
   Map& map = odometry->map;
-  // With an attitude, the world is that of the attitude, and upright.
+  // The world is the frame of the first camera; with an attitude it has the axes of the attitude,
+  // and is upright.
   frame0->cam_from_world = kIdentity;
   odometry->is_upright = frame0->sensors.attitude_sigma_rad > 0;
   if (odometry->is_upright) {

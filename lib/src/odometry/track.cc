@@ -87,7 +87,8 @@ bool add_frame_as_keyframe(Odometry* odometry, Frame* frame, LoopEnd* loop,
   const int32_t end_id = loop != nullptr ? map.keyframes[loop->keyframe].id : -1;
   const int32_t next_point_id = map.next_point_id;
   make_room(odometry, 1);
-  // No frame takes the time of a loop, or of a step after it, and of all these points.
+  // A frame that has just done a step of a loop, or found one, does not also take the time for all
+  // these points.
   const bool can_wait = odometry->done == Work::kStepSpread || loop != nullptr;
   const int32_t keyframe = make_keyframe(odometry, *frame);
   begin_check(odometry, map.keyframes[keyframe].id);
@@ -167,8 +168,8 @@ bool finish_tracked(Odometry* odometry, const PoseFit& fit, bool follows, bool g
   // The path jumps here, because the map was moved since the last tracked frame.
   if (odometry->was_moved_far) state->map_reasons |= TV_MAP_REASON_JUMPED;
   odometry->was_moved_far = false;
-  // It was tracked with the map as it was, which a check may confirm now and an adjustment moves
-  // before the next frame.
+  // The frame was tracked with the map as it is at this moment; a check may confirm that map now,
+  // and an adjustment will move it before the next frame.
   add_doubts(*odometry, state);
   const bool is_due = needs_keyframe(*odometry, *frame, fit.estimate.num_inliers);
   LoopEnd loop;
@@ -260,8 +261,8 @@ void lose_frame(Odometry* odometry, const Frame& frame, tv_odometry_state* state
   odometry->has_motion = false;
 }
 
-// Tries what the state allows, and says what was found out about the frame. Where that is a pose,
-// the frame and *state have it.
+// Tries, in order, what the state allows, and returns what succeeded. If that gives a pose, it is
+// written to the frame and *state.
 TrackingEvent place_frame(Odometry* odometry, bool has_gap, Frame* frame,
                           tv_odometry_state* state) {
   ArenaScope scope(odometry->scratch);
@@ -312,7 +313,8 @@ void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry
   if (odometry->map.num_keyframes == 0) tracking->state = TrackingState::kStarting;
   move_on(place_frame(odometry, input.gap != 0, frame, state), tracking);
   frame->has_pose = has_pose(tracking->state);
-  // The points near the keyframes in which the frame was not found are not those of the next one.
+  // The list of local points is of the keyframes in which the frame was not found, and not of the
+  // reference keyframe.
   if (tracking->state == TrackingState::kTurned) {
     list_local_points(odometry, find_keyframe(odometry->map, odometry->reference_id));
   }

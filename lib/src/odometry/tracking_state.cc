@@ -5,8 +5,8 @@ namespace {
 
 constexpr int kNumStates = 4, kNumEvents = 6;
 
-// Frames in a row whose pose is only that of a turn: the position of the first one is kept for all
-// of them, and the errors of the turns add up.
+// The most frames in a row that are followed by their turn alone: they keep the position of the
+// first, and the errors of the turns add up.
 constexpr int32_t kMostTurnedFrames = 60;
 // Frames without a pose from the map, before another segment is begun. Of a picture that was
 // covered for less, the frames after it are found in the map.

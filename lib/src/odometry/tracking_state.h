@@ -35,7 +35,7 @@ struct Tracking {
 // Whether this is tried for the next frame.
 bool may_try(const Tracking& tracking, TrackingEvent event);
 
-// What was found out about the frame leads to its state.
+// Sets the state that follows from this event.
 void move_on(TrackingEvent event, Tracking* tracking);
 
 // Whether a frame in this state has a pose.

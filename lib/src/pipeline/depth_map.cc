@@ -10,9 +10,9 @@
 namespace tv {
 namespace {
 
-// How many times as far as through a pinhole of the camera's focal length things lie apart that the
-// image shows at two opposite edges, in their middle or in the corners, [1, 2]: a lens that bends
-// lines outwards sees more. Beyond twice, the middle of the map would become too coarse.
+// How much wider the image's field is than that of a pinhole of the same focal length: the larger
+// of the ratios in the middle and at the edges of the picture, [1, 2]. A lens that compresses the
+// outer picture sees more. Beyond 2 the middle of the map would become too coarse.
 double field_of(const Camera& lens, bool across) {
   constexpr double kMost = 2;
   const tv_camera& camera = lens.model;

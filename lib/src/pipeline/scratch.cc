@@ -29,7 +29,8 @@ size_t extract_rung_bytes(const tv_limits& limits, int32_t rung) {
   of_view.max_keypoints = view_budget(rung, 0, limits.max_keypoints);
   size_t most = extract_scratch_bytes(of_view);
   for (int32_t tilt = 1; tilt < tilts_of_rung(rung); ++tilt) {
-    // Of a smaller image, a view that is left out here may be used; it is not larger than this.
+    // A view that is left out here, because it is too large, may be used for a smaller image; it is
+    // then not larger than this one.
     Squeeze squeeze = squeeze_of(tilt, limits.max_width, limits.max_height);
     squeeze.width = std::min(squeeze.width, kMaxViewSide);
     of_view.max_width = squeeze.width;

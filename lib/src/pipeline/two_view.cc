@@ -100,7 +100,7 @@ bool estimate_without_still(tv_context* context, const tv_camera* const cameras[
   problem.focal_log_scale = 0;
   problem.focal_is_ambiguous = false;
   context->arena.used_bytes = used_bytes;
-  // In place, since each temporary would lie on the stack, too.
+  // Constructed in place, since a temporary would take stack.
   new (&e.matches) Matches{};
   new (&e.model) TwoViewModel{};
   Evidence* const evidence = e.outcome.evidence;

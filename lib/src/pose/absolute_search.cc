@@ -105,8 +105,8 @@ void search_absolute_pose(const Sightings& sightings, const tv_absolute_pose_opt
   AbsoluteEstimator estimator{sightings, options.max_error_px, indices};
   Sampler sampler =
       make_sampler(options.seed, sightings.num, AbsoluteEstimator::kSampleSize, progressive);
-  // Few matches have few different samples; so many draws miss all those of four inliers once in 50
-  // times.
+  // Few matches have few different samples. With this many draws, all samples of the four inliers
+  // are missed once in 50 times.
   const double n = sightings.num, different = n * (n - 1) * (n - 2) / 6;
   const int most =
       different < options.max_iterations ? static_cast<int>(different) : options.max_iterations;

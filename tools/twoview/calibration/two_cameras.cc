@@ -98,7 +98,7 @@ SecondCamera find_second_camera(const std::vector<ViewForm>& views) {
   if (!(best.gain > kShare * sum_sq) || !(best.gain > kPart * sum_own)) return result;
   const auto count = std::count(best.is_second.begin(), best.is_second.end(), true);
   const auto others = static_cast<std::ptrdiff_t>(views.size()) - count;
-  // Of equal parts the one without the first view is named.
+  // Where both parts have the same number of views, the one without the first view is named.
   const bool is_second_smaller = count < others || (count == others && !best.is_second[0]);
   for (size_t i = 0; i < views.size(); ++i)
     if (best.is_second[i] == is_second_smaller) result.views.push_back(i);

@@ -33,7 +33,7 @@ void VehicleEstimates::send(tvm_session* session, int64_t host_ns, const tv_odom
   }
   tvm_estimate estimate{};
   estimate.struct_size = sizeof estimate;
-  // A socket that cannot send now is no end of the flight.
+  // If the socket cannot send at this moment, the flight goes on.
   const tvs_status status = tvm_session_send_track(session, &estimator_, &track, &estimate);
   if (status == TVS_OK || status == TVS_NONE) ++num_[static_cast<size_t>(estimate.silence)];
 }

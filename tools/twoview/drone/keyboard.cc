@@ -9,7 +9,8 @@
 namespace cli {
 namespace {
 
-// The mode of the terminal before. Not the keyboard's own, because a signal restores it, too.
+// The mode of the terminal before it was changed. It is not a member of Keyboard, because the
+// handler of signals restores it, too.
 termios& mode_before() {
   static termios mode{};
   return mode;

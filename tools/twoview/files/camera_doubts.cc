@@ -14,8 +14,9 @@ namespace {
 constexpr double kNearMiddle = 0.05, kFarFromMiddle = 0.08;
 // Differences of fx and fy, as shares: of one lens, and of two numbers that are not of one lens.
 constexpr double kSameFocal = 0.05, kOtherFocal = 0.1;
-// The factor between the sizes of two images that is above any principal point's doubt, and the
-// shares to which the factors of both axes are then the same, and two calibrations of one camera.
+// kOtherScale: an image size that differs by more than this factor is no error of a principal
+// point. kSameScale: the factors of both axes agree to this share. kSameIntrinsics: two
+// calibrations of one camera agree to this share.
 constexpr double kOtherScale = 1.15, kSameScale = 0.1, kSameIntrinsics = 0.1;
 
 double share_off_middle(double center, int side) { return std::abs((center + 0.5) / side - 0.5); }
@@ -58,7 +59,8 @@ void refuse_other_scale(const tv_camera& camera, const std::string& where) {
   const double y = 2 * (camera.cy + 0.5) / camera.height;
   const bool is_larger = std::min(x, y) > kOtherScale;
   const bool is_smaller = std::min(x, y) > 0 && std::max(x, y) < 1 / kOtherScale;
-  // A principal point that is outside the image is of another one, whatever its shape.
+  // Where the principal point lies outside the image, it belongs to another image, whatever the
+  // ratio of its axes.
   const bool is_outside = std::max(x, y) > 2;
   if (!(is_larger && is_outside) && !((is_larger || is_smaller) && difference(x, y) <= kSameScale))
     return;

@@ -69,8 +69,8 @@ const Names kProjection = {"projection_matrix", "p"};
 const Names kRoi = {"roi_x_offset", "roi_y_offset", "roi_width",
                     "roi_height",   "binning_x",    "binning_y"};
 
-// What the words of kModel say of the lens. kAny says nothing: Kalibr's camera_model is "pinhole"
-// beside any distortion_model.
+// The kind of lens that an entry of kModel names. kAny: the entry does not decide it, as Kalibr's
+// camera_model "pinhole", which stands beside any distortion_model.
 enum class Lens { kAny, kNone, kBrown, kFisheye };
 const std::map<std::string, Lens> kWords = {
     {"pinhole", Lens::kAny},

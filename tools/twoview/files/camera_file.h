@@ -13,8 +13,9 @@ namespace cli {
 struct CalibrationSigmas {
   double focal, center;
 };
-// Of a camera file that does not say how sure it is, chosen on the data sets' pairs
-// (docs/decisions/0024-honest-covariance.md), and of a focal length as for 35 mm film.
+// The standard deviations that are assumed for a camera file which states none, chosen on the pairs
+// of the data sets (docs/decisions/0024-honest-covariance.md), and for a focal length as for 35 mm
+// film.
 inline constexpr CalibrationSigmas kPlainFile{0.01, 0.005}, kFilm{0.1, 0.01};
 
 // The text of a camera file in OpenCV's format. Reading it gives the same camera, bit for bit,

@@ -19,9 +19,9 @@ const std::string kWords =
     "(?:copy|copie|copia|cópia|kopie|kopia|kopio|kopi|копия|コピー|副本|복사본)";
 const std::string kCount = "\\(?[0-9]{1,3}\\)?";
 
-// Correlation of the brightness of blocks of 8 x 8 pixels from which on two pictures are the same
-// one, stored with other settings (measured: above 0.999 down to JPEG's quality 30), or, where a
-// word says that it is a copy, edited.
+// From this correlation of the brightness of blocks of 8 x 8 pixels on, two pictures are the same
+// picture: stored with other settings (measured: above 0.999 down to JPEG's quality 30), or edited,
+// where a word in the name says that it is a copy.
 constexpr double kSameStored = 0.995, kSameEdited = 0.8;
 constexpr int kBlock = 8;
 
@@ -64,7 +64,7 @@ cv::Mat blocks_of(const fs::path& path) {
   return blocks;
 }
 
-// -1 to 1; -1 where they cannot be compared.
+// The correlation, -1 to 1; -1 where the pictures cannot be compared.
 double correlation(const fs::path& a, const fs::path& b) {
   const cv::Mat x = blocks_of(a), y = blocks_of(b);
   if (x.empty() || x.size() != y.size()) return -1;

@@ -41,8 +41,8 @@ bool has_picture_ending(const std::filesystem::path& path);
 // A line where the numbers of a sequence's names jump, so that pictures may be missing; else empty.
 std::string jump_words(const std::vector<std::string>& names);
 
-// The place in a sequence's names at which a camera's counter jumps that seems to have begun anew
-// after 9999: what stands from there on was taken before the rest. 0: nowhere.
+// The place in a sequence of names where a camera's counter jumps, as if it had begun anew after
+// 9999: the names from that place on were then taken first. 0: there is no such place.
 size_t begun_anew_at(const std::vector<std::string>& names);
 
 // The first bytes of a picture's file, in which its size and its EXIF data stand.

@@ -94,7 +94,7 @@ bool is_raw_name(const std::string& path) {
 
 // Decodes all pixels of a file's bytes with the file's depth and channels. Throws BadInput.
 cv::Mat decode(const std::string& path, const std::string& bytes) {
-  // Many are TIFF files, of which OpenCV decodes the small preview.
+  // Many raw files are TIFF files, and OpenCV would decode their small preview.
   if (is_raw_name(path)) throw BadInput("image " + path + " " + kRawWords);
   const ImageHeader header = read_image_header(bytes);
   const auto refuse_huge = [&](int64_t width, int64_t height) {

@@ -63,7 +63,7 @@ cv::Mat load_pixels(const std::string& path, bool* has_more = nullptr);
 // For the bytes of a HEIC, AVIF or GIF picture, which are not read: what it is and what to do, such
 // as "is a HEIC picture, which is not read: convert it to JPEG". Empty for any other bytes.
 std::string unread_picture(std::string_view bytes);
-// The same of a file; empty if it cannot be read.
+// The same for a file; empty if the file cannot be read.
 std::string unread_picture_file(const std::string& path);
 
 // The size to which shrink() brings an image of this size.

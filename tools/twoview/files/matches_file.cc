@@ -47,7 +47,7 @@ bool contains(const Names& names, std::string_view name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-// Which fields of a line are what.
+// The index, in a line, of each field that is used.
 struct Columns {
   std::vector<size_t> pixels = {0, 1, 2, 3};
   std::optional<size_t> score;

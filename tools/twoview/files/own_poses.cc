@@ -89,7 +89,7 @@ OwnPoses parse_own_poses(const std::string& text, const std::string& file) {
   return poses;
 }
 
-// A file whose own name has an equals sign is given without NAME=.
+// A file whose name contains an equals sign can be given without NAME=.
 std::string file_of_poses(const std::string& given) {
   std::error_code error;
   const size_t equals = given.find('=');

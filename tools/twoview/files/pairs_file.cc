@@ -40,7 +40,8 @@ void check_K(const std::array<double, 9>& K, const char* name) {
   if (K[1] != 0) throw BadInput(what + " has skew, which is not supported");
   if (K[3] != 0 || K[6] != 0 || K[7] != 0 || K[8] != 1)
     throw BadInput(what + " is not [fx 0 cx 0 fy cy 0 0 1]");
-  // Of pixels such a matrix would be of a picture of a few of them.
+  // A matrix within these limits is in units of the image size: in pixels it would be of a picture
+  // of a few pixels.
   constexpr double kMostFocal = 20, kMostCentre = 2;
   if (K[0] < kMostFocal && K[4] < kMostFocal && std::abs(K[2]) <= kMostCentre &&
       std::abs(K[5]) <= kMostCentre)

@@ -135,9 +135,9 @@ class Differences {
   Differences(const fs::path& folder, const std::vector<std::string>& names)
       : folder_(folder), names_(names) {}
 
-  // Of each edge the logarithm of its difference over those of its two pictures with the most alike
-  // of their other neighbours: about 0 where a camera moves evenly, however fast. Edges of pictures
-  // that cannot be compared are left out.
+  // For each edge (two neighbouring pictures): the logarithm of the difference of the two, over
+  // that of each of them from the most similar of its other neighbours. It is about 0 where a
+  // camera moves evenly, however fast. Edges of pictures that cannot be compared are left out.
   std::vector<double> of(const std::vector<Edge>& edges, const Neighbours& neighbours) {
     std::vector<double> logs;
     for (const auto& [i, j] : edges) {
@@ -215,7 +215,7 @@ double evidence(Differences& differences, const Order& order, const Order& other
   return (of_b.mean - of_a.mean) / std::sqrt(variance * (1 / of_a.count + 1 / of_b.count) + 1e-12);
 }
 
-// Where the one order first differs: "b.png after a.png, not after c.png".
+// The first place where the orders differ, in words: "b.png after a.png, not after c.png".
 std::string difference_words(const std::vector<std::string>& names, const Order& order,
                              const Order& other) {
   std::map<size_t, size_t> before;

@@ -54,7 +54,7 @@ bool is_usual_format(const std::string& file) {
   return ending == ".jpg" || ending == ".jpeg" || ending == ".png";
 }
 
-// Makes the pictures of frames, of the lens, into those of a pinhole.
+// Turns pictures of the lens into those of a pinhole.
 class Maker {
  public:
   explicit Maker(const tv_camera& lens) : lens_(lens), camera_(lens) {

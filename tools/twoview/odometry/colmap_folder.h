@@ -31,7 +31,7 @@ class ColmapFolder {
                                         const std::atomic<bool>& stop);
   // {num, bytes, size, focal_length}: of the pictures; null without any.
   nlohmann::ordered_json pictures_json() const;
-  // Such as "34 pictures, 2.1 MiB"; empty without any.
+  // How many pictures there are and their size, such as "34 pictures, 2.1 MiB"; empty without any.
   std::string pictures_words() const;
 
   // Gives the files their names, and removes those of an earlier run that this one did not write.

@@ -65,7 +65,7 @@ class Frames {
     return result;
   }
   int num() const { return index_; }
-  // What the user must know of the clock.
+  // Lines for the user about the clock.
   std::vector<std::string> notes() const {
     std::vector<std::string> notes;
     if (const int64_t count = clock_.num_left_out(); count > 0)

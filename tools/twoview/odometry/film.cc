@@ -16,8 +16,8 @@
 namespace cli {
 namespace {
 
-// Whether the camera is of pictures of this size when they are shown with square pixels: players
-// keep the one side or the other.
+// Whether the camera file is for the size at which a player shows these pictures with square
+// pixels. Players keep either the width or the height.
 bool is_shown_size(const tv_camera& camera, int width, int height, double pixel_aspect) {
   const auto is_near = [&](double w, double h) {
     return std::abs(camera.width - w) <= 1 && std::abs(camera.height - h) <= 1;

@@ -66,7 +66,8 @@ class FilmPairs {
     for (const Pair& pair : pairs_) {
       tv_two_view found;
       estimate(camera, pair, &found);
-      // A focal length that was left as given, or of which two fit, is no evidence.
+      // A focal length that the estimate left as it was given, or of which two values fit, is no
+      // evidence.
       const bool is_refined = found.has_covariance && found.focal_scale > 0 &&
                               found.focal_sigma > 0 && found.focal_sigma < kLeastKnown;
       if (!is_refined) continue;
@@ -205,7 +206,8 @@ std::string FilmLens::words() const {
 FilmLens estimate_film_lens(FrameSource& source, const FlightOptions& options,
                             const std::atomic<bool>& stop,
                             const std::function<void(const std::string&)>& progress) {
-  // A map that was made with a wrong lens remembers it: about this share of each change is missing.
+  // A map that was made with a wrong lens is bent to fit that lens: an adjustment of the lens with
+  // the finished map misses about this share of the change.
   constexpr double kRemembered = 0.2;
   // A change below this one needs no other map.
   constexpr double kSettled = 0.02;

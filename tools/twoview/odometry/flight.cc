@@ -48,8 +48,8 @@ Thumbnail thumbnail_of(const cv::Mat& luma) {
   return {small.cols, small.rows, std::string(bytes.begin(), bytes.end())};
 }
 
-// The colour of the pixel that a place of a picture lies in, of which this one may be a larger
-// copy.
+// The colour of the pixel at (x, y), where the picture may be larger than the one that x and y
+// refer to.
 Rgb colour_at(const cv::Mat& picture, double scale_x, double scale_y, double x, double y) {
   const int column = static_cast<int>(std::floor((x + 0.5) * scale_x));
   const int row = static_cast<int>(std::floor((y + 0.5) * scale_y));
@@ -223,7 +223,7 @@ void Flight::track_frame(SourceFrame frame) {
   }
   eyes_.add(frame.luma);
   combed_rows_.add(frame.luma);
-  // Over a pause that is longer, motion is not foretold.
+  // Over a longer pause the motion is not predicted.
   if (!given_.empty() && frames_.back().withheld)
     gap_ = gap_ || frame.time_s - frames_[given_.back()].time_s > kLongestPause_s;
   give(frame, record);

@@ -95,8 +95,8 @@ class Flight {
   // The picture of the last frame, as it was tracked; only within `after_frame` of track(), and
   // empty for a frame that could not be used.
   const cv::Mat& picture() const { return picture_; }
-  // Its colours, BGR, of the size of the source's frames, and its mask, of the size of picture();
-  // both may be empty. Likewise only within `after_frame`.
+  // The colours, BGR, of the picture, of the size of the source's frames, and its mask, of the size
+  // of picture(). Both may be empty, and both are valid only within `after_frame`.
   const cv::Mat& colour() const { return colour_; }
   const cv::Mat& mask() const { return mask_; }
   // The direction down in a segment of the map by the attitudes of its frames; null where none was
@@ -111,7 +111,7 @@ class Flight {
   const tv_camera& camera() const { return camera_; }
   // The camera of the frames as the source gives them, before they are scaled down.
   const tv_camera& file_camera() const { return file_camera_; }
-  // The same, with the principal point as the odometry has moved it.
+  // file_camera() with the principal point as the odometry has moved it.
   tv_camera corrected_file_camera() const;
   bool has_corrected_camera() const {
     return state_.principal_point_shift_px[0] != 0 || state_.principal_point_shift_px[1] != 0;
@@ -129,7 +129,7 @@ class Flight {
   int num_unreadable() const { return num_unreadable_; }
   // Pictures that the source gave again while the camera moved on. After finish().
   int num_repeated() const { return static_cast<int>(repeated_.stood().size()); }
-  // A line on them; empty where there are none.
+  // A line about the repeated pictures; empty where there are none.
   std::string repeated_note() const;
   // Whether the pictures are of two eyes, so that no camera describes them.
   const TwoEyes& eyes() const { return eyes_; }

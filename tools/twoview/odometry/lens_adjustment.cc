@@ -193,7 +193,7 @@ class Adjustment {
     }
   }
 
-  // That of the noise, and how much the windows contradict each other.
+  // The covariance of the lens: that of the noise, and that of the differences between the windows.
   LensMatrix covariance() {
     constexpr double kToInvert = 1e-6;
     linearise(kToInvert);
@@ -290,7 +290,8 @@ bool is_lens_beyond(double sigmas, const CameraEvidence& e) {
   return is_beyond(sigmas, e.edge_change, e.edge_sigma);
 }
 
-// A shift of the principal point counts as the turn of the camera that it is taken for.
+// A shift of the principal point has about the effect of a turn of the camera, and is judged by the
+// angle of that turn.
 bool is_centre_beyond(double sigmas, const CameraEvidence& e) {
   const auto is_axis_beyond = [&](size_t k) {
     return is_beyond(sigmas, e.centre_shift_px[k] / e.focal_px, e.centre_sigma_px[k] / e.focal_px);

@@ -41,8 +41,9 @@ struct CameraEvidence {
   bool is_known = false;    // false: the keyframes are too few
   double focal_change = 0;  // that of the camera that fits the map, over the given one, less 1
   double focal_sigma = 0;   // its standard deviation
-  // By how much farther from the middle than by the given camera a ray meets the picture, over the
-  // distance, and its standard deviation.
+  // The relative change, with its standard deviation, of the distance from the middle of the
+  // picture at which a ray is seen, four fifths of the way to a corner, from the given camera to
+  // the one that fits.
   double edge_change = 0, edge_sigma = 0;
   // How far the principal point of the camera that fits the map lies from the given one, x and y in
   // pixels, and the standard deviations. A wrong ratio of fx and fy shows here, too.

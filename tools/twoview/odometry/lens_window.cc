@@ -159,7 +159,8 @@ void LensWindow::step(const Lens& of_lens, const Lens& next, std::vector<View>* 
     }
     const Vec3 move = -1 * (e.inverse * right);
     Point& point = (*new_points)[p];
-    // The step of a distant point is often far too long in depth: of these, the best.
+    // The step of a distant point is often far too long in depth: several lengths of the step are
+    // tried, and the best one is kept.
     double least = -1;
     for (const double share : {1.0, 0.3, 0.0}) {
       Point shifted = points[p];

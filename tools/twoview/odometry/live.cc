@@ -102,7 +102,7 @@ struct LivePage::State {
   std::atomic<uint64_t> asked_ns{0};
   std::thread worker;
 
-  // Between the threads. Hold the mutex while reading or writing it.
+  // Used by both threads. Hold the mutex while reading or writing it.
   std::mutex mutex;
   std::condition_variable wakes;
   bool stops = false;
@@ -136,7 +136,8 @@ struct LivePage::State {
                            const char* method, const char* version, const char* upload,
                            size_t* upload_size, void** request);
   MHD_Result respond(MHD_Connection* connection, const std::string& path);
-  // Whether the request names this server, and not a name that some page made point to it.
+  // Whether the request was sent to this server by its own address, and not by a foreign name that
+  // a page made resolve to it.
   bool is_own(MHD_Connection* connection) const;
   std::string data_text();  // with the mutex held
 

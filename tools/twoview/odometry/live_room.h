@@ -23,7 +23,7 @@ class LiveRoom {
   // The next keyframe of the room with its partners, once frames before and after it are kept and
   // it shows something new.
   std::optional<Job> next(const Flight& flight);
-  // Forgets the pictures, which are of frames too long ago once some have not been kept.
+  // Forgets the kept pictures: after frames that were not kept they are of too long ago.
   void forget_pictures();
 
  private:

@@ -12,7 +12,8 @@ namespace {
 constexpr size_t kWindow = 8;  // frames whose way is compared with the shortest one
 constexpr size_t kFewest = 3;  // windows, and steps on each side of a jump
 constexpr size_t kBeside = 5;  // steps on each side of a jump that it is compared with
-// Of a window's way and of a jump, radians: the places of a camera that stands are noise.
+// The least length of a window's path and of a jump that count, in radians as seen from the scene's
+// depth: the positions of a camera that stands still are noise.
 constexpr double kLeastWay = 0.03;
 // Measured 2026-11-30. The way over the shortest one: at most 1.02 in eight sequences, also with
 // every fourth frame alone, and seven flights; 1.15 to 6 where neighbours are exchanged, counters

@@ -44,8 +44,8 @@ bool RepeatedPictures::is_repeated(const cv::Mat& luma, size_t frame) {
     is_after_repeated_ = true;
     return true;
   }
-  // Between the two, once: the encoder stored the picture anew (a key frame), or the camera begins
-  // to move, which the next picture says.
+  // Once after a repeated picture: either the encoder stored the picture anew (a key frame), or the
+  // camera begins to move. The next picture decides.
   const bool is_doubtful = is_after_repeated_ && step < kMovedOn * usual;
   if (is_doubtful)
     run_.push_back(frame);

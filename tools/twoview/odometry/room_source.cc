@@ -382,8 +382,9 @@ Sides sides_of(const std::vector<Pose>& poses) {
   return sides;
 }
 
-// Throws where what the pictures confirm lies elsewhere than where the given poses put it. Poses of
-// a tracker beside the camera and clocks that differ a little move it by a few pixels alone.
+// Throws BadInput where the points that the pictures confirm lie elsewhere than the given poses put
+// them. A tracker that is mounted beside the camera, or a clock that is slightly off, moves them by
+// a few pixels only.
 void require_poses_of_pictures(const RoomSource& from, const PosedPoints& points,
                                const std::vector<Pose>& poses) {
   // Shares of the matches that fit. By chance 0.03 to 0.1 do, and as many as a half where a camera

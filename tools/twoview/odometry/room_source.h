@@ -47,8 +47,8 @@ RoomSource room_source_of_colmap(const std::string& model, const std::string& pi
 TruePath true_path(const RoomSource& from, const std::string& file);
 
 // Matches pictures of the scene's views, from first_view on and at most most_pictures of them.
-// Throws BadInput where they contradict its poses, and says as what these would fit. Finds points
-// for a scene without any.
+// Throws BadInput where the matches contradict the poses, and says under which reading the poses
+// would fit. Finds points for a scene without any.
 void add_posed_points(RoomSource& from, size_t first_view, size_t most_pictures,
                       const std::atomic<bool>& stop);
 

@@ -17,7 +17,7 @@ struct RoomTruthOptions {
   double depth_scale = 0;   // grey levels a metre
 };
 
-// --truth-mesh, --truth-depth and --truth-scale; the options that were added.
+// Adds --truth-mesh, --truth-depth and --truth-scale. Returns the options that were added.
 std::vector<CLI::Option*> add_truth_options(CLI::App& verb, RoomTruthOptions& options);
 nlohmann::ordered_json truth_options_json(const RoomTruthOptions& options);
 
@@ -29,7 +29,7 @@ struct TruePath {
   std::vector<std::string> notes;  // on what else is odd of them
 };
 
-// The words where --truth-mesh comes without a true path.
+// The message where --truth-mesh is given without a true path.
 extern const char* const kMeshNeedsPath;
 
 class TrueRoom {

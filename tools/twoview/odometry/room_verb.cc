@@ -54,7 +54,8 @@ RoomSource confirmed(RoomSource from, bool is_flight, const std::atomic<bool>& s
   return from;
 }
 
-// What FOLDER is: frames whose poses --poses gives, a model of COLMAP, or a flight's results.
+// Finds out what FOLDER is, and reads it: frames with the poses of --poses, a model of COLMAP, or
+// the results of a flight.
 RoomSource source_of(const Arguments& a, const std::atomic<bool>& stop) {
   if (!a.poses.empty()) {
     if (!a.source.empty())

@@ -56,7 +56,7 @@ const Pose* pose_at(const Trajectory& truth, double time_s, double nearest_s) {
   return std::abs(at->time_s - time_s) <= nearest_s ? &at->pose : nullptr;
 }
 
-// How the turns of the truth, whose times are `later_s` later than those of the frames, fit.
+// How well the turns of the truth fit, if its times are later_s later than those of the frames.
 struct Fit {
   size_t count = 0;
   double difference = 0, turn = 0;  // rms, radians

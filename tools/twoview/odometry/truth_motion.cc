@@ -51,7 +51,8 @@ Steps steps_of(const Trajectory& estimate, const Trajectory& truth,
   return steps;
 }
 
-// A truth whose position is exactly the one before, in places where the path moves.
+// What is wrong where positions of the truth are exactly equal to the one before although the path
+// moves.
 std::string standing_words(const Steps& steps) {
   double moved = 0;
   size_t num_poses = 0, first = 0;
@@ -130,8 +131,8 @@ double rms_of(const Similarity& fit, const std::vector<Vector3>& from,
   return std::sqrt(sum / static_cast<double>(from.size()));
 }
 
-// A coordinate that is one and the same in all poses, and without which the path fits far better:
-// what is not known of the truth is taken from the path that fits it, in turn with the fit.
+// What is wrong where a coordinate of the truth is the same in all poses, and the path fits far
+// better without it. The missing coordinate is taken from the fitted path, in turn with the fit.
 std::string plane_words(const Steps& steps, const Accuracy& accuracy) {
   constexpr int kRounds = 50;
   for (size_t k = 0; k < 3; ++k) {

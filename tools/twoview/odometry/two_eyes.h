@@ -22,8 +22,8 @@ class TwoEyes {
   std::string words() const;
 
  private:
-  // Of patches of one half of the pictures: the shares that the other half has at their rows, and
-  // at other rows, as chance gives; one number a picture.
+  // For patches of one half of a picture, the share that is found in the other half at the same
+  // rows, and at other rows, which chance alone gives; one number a picture.
   struct Halves {
     std::vector<double> same_rows, other_rows;
     bool are_alike() const;

@@ -20,7 +20,8 @@ MapView view_of(const Flight& flight, const std::vector<FlightKeyframe>& keyfram
   if (held.empty()) return {};
   const Vector3 up = up_of_cameras(held, flight.turn_deg());
   const Vector3 down = measured.value_or(Vector3{-up[0], -up[1], -up[2]});
-  // To the right of where the first keyframe looks; where it looks straight down, its own right.
+  // "Right" is to the right of where the first keyframe looks; where it looks straight down, it is
+  // that camera's own right.
   const Matrix3& first = held.front();
   Vector3 right = cross(down, {first[2], first[5], first[8]});
   if (norm(right) < 0.1) right = cross(cross(down, {first[0], first[3], first[6]}), down);

@@ -142,7 +142,7 @@ std::vector<Reading> other_readings(const Picture pictures[2], const std::vector
   return readings;
 }
 
-// Of pictures that were cut or framed.
+// The readings for pictures that were cut or framed before they were matched.
 std::vector<Reading> cut_readings(const Picture pictures[2]) {
   std::vector<Reading> readings;
   for (const Reading::Kind kind : {Reading::Kind::kFramedAbove, Reading::Kind::kFramedBeside})

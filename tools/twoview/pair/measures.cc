@@ -66,7 +66,7 @@ double match_precision(const tv_camera& camera0, const tv_camera& camera1, const
   if (reconstruction.num_matches == 0) return 0;
   const Matrix3 skew = {0, -t[2], t[1], t[2], 0, -t[0], -t[1], t[0], 0};
   const Matrix3 E = product(skew, R);
-  // SuperGlue does not normalise t; the measure does not depend on its length.
+  // SuperGlue's t is not normalised, but this measure does not depend on its length.
   int right = 0;
   for (int32_t i = 0; i < reconstruction.num_matches; ++i) {
     const tv_correspondence& match = reconstruction.matches[i];
