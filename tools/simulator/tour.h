@@ -11,7 +11,7 @@ namespace simulator {
 
 class Tour {
  public:
-  // The way from `start` on the floor, whose x and y the tour comes back to.
+  // Makes the way of the tour: it begins and ends above `start`, on the floor.
   explicit Tour(const Vec3& start);
 
   // Steers the drone for the next `seconds`. Call it often.

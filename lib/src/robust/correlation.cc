@@ -100,7 +100,8 @@ double add_jackknife(int num, BlockSums& sums, const PoseUncertainty& uncertaint
     }
     for (int k = 0; k < packed; ++k) left[k] = all[k] - left[k];
     for (int k = 0; k < num; ++k) of_left[k] = slope[k] - of_left[k];
-    // Where the others do not determine the model, all of the curvature takes their place.
+    // Where the matches of the other blocks do not determine the model, the curvature of all blocks
+    // is used in place of theirs.
     if (!solve_damped(num, left, of_left, 0, without)) solve_damped(num, all, of_left, 0, without);
     for (int r = 0; r < kPose; ++r) {
       for (int c = 0; c < kPose; ++c) {

@@ -147,7 +147,8 @@ struct PoseEquations {
   double upper[kPacked], gradient[PoseModel::kParameters];
 };
 
-// What these equations take of the pose, for one region after another.
+// What the normal equations need of a pose that stays the same while they are made for one region
+// after another.
 struct FixedPose {
   Mat3 essential, columns[PoseModel::kParameters];
   RobustLoss loss;

@@ -39,7 +39,8 @@ bool leaves_parallax(const Matches& matches, const Mat3& H, const uint8_t* inlie
   const double divergence =
       share * log(share / chance) +
       (agreeing < unexplained ? (1 - share) * log((1 - share) / (1 - chance)) : 0.0);
-  // The epipole was chosen by the best two of them.
+  // The epipole was not given, but chosen as the best intersection of two of these matches: hence
+  // the number of pairs.
   return log_binomial(unexplained, 2) - n * divergence < kLogMeaningful;
 }
 
@@ -78,7 +79,7 @@ tv_kind choose_kind(Fit& f, const Rivals& rivals, int sample_size) {
   const EpipolarModel& epipolar = f.out->epipolar;
   const bool calibrated = f.problem.calibrated;
   const int n = f.matches.pairs.num;
-  // Each model must be meaningful by its own number of inliers.
+  // A model is possible only if its own number of inliers is more than chance explains.
   const double disc =
       std::min(1.0, kPi * kTransferThresholdScale * kTransferThresholdScale * 2 * f.threshold *
                         f.threshold / f.matches.area_px * sigma_means(f.matches).s_sq);

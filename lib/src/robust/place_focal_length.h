@@ -13,9 +13,9 @@ namespace tv {
 void search_focal_length(TwoViewProblem& problem, Matches* matches, Arena& arena,
                          TwoViewModel* model);
 
-// Then refines pose and focal length together, with that deviation as a prior; the cameras and the
-// rays follow. A focal length that was found as given stays so where the matches would not lower
-// its deviation by a fifth.
+// After search_focal_length: refines pose and focal length together, with the deviation of the
+// calibration as a prior; cameras and rays follow. A focal length that was found to be as given
+// stays so, unless the matches would lower its deviation by a fifth.
 TVK_NOINLINE void place_focal_length(Fit& f);
 
 }  // namespace tv

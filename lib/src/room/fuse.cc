@@ -339,7 +339,8 @@ template <typename Visit>
 bool visit_near(const Fusion& f, const Visit& visit) {
   const tv_depth_map& map = f.view.map;
   const int32_t side = square_side(f);
-  // Most points lie in blocks of others nearby.
+  // Many points lie in a block that a point nearby has just visited: a small table holds the blocks
+  // visited last.
   constexpr int kVisitedBits = 8;
   uint64_t visited[1 << kVisitedBits] = {};
   for (int32_t y = 0; y < map.height; y += side) {

@@ -58,7 +58,7 @@ Layers layers_at(const tv_room& room, const MeshRequest& request, int32_t x, int
   return {measured, find_block(room, block_key(room, {x, y, z, true}))};
 }
 
-// The block that holds the place's cells.
+// The block, of the two at one place, whose task it is to make the triangles of the cells there.
 int32_t owner_of(const Layers& layers) {
   return layers.measured >= 0 ? layers.measured : layers.inferred;
 }
@@ -192,7 +192,7 @@ bool is_within(const BlockPlace& place, const MeshRequest& request, int32_t marg
   return true;
 }
 
-// Whether a block holds the cells of its place.
+// Whether this block makes the triangles of the cells of its place.
 bool owns_cells(const tv_room& room, const MeshRequest& request, int32_t index) {
   if (room.blocks[index].key == 0) return false;
   const BlockPlace place = place_of(room.blocks[index].key);

@@ -6,7 +6,8 @@
 
 namespace tv {
 
-// The record of a map that was added with these contents, of equal ones the last; -1 without.
+// The index of the record of a map that was added with these contents, the last one if there are
+// several; -1 if there is none.
 int32_t find_record(const tv_room& room, const RoomView& view);
 
 // Adds a map, of which the room has fewer than TV_ROOM_MAX_MAPS, and its record. False: there is no

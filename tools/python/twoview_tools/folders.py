@@ -23,7 +23,7 @@ def natural_key(name):
     for piece in _PIECES.findall(data.lower()):
         if piece[:1].isdigit():
             digits = piece.lstrip(b"0")
-            # A number takes the place of the byte "0" against another byte.
+            # Compared with a character that is no digit, a number counts as the character "0".
             pieces.append((2 + _ZERO, len(digits), digits))
         else:
             pieces.append((_FIRST.get(piece, 2 + piece[0]), 0, b""))

@@ -25,7 +25,7 @@ struct OwnMatchOptions {
   // Adds --matches and --matches-resize, which exclude the options of corners, of descriptors and
   // of their matching: call it after add_common. type: what --help calls the path.
   void add_to(CLI::App& verb, const std::string& help, const std::string& type);
-  // Adds both to the options of a result.
+  // Adds the values of --matches and --matches-resize to the options in result.json.
   void add_json(nlohmann::ordered_json& options) const;
 };
 

@@ -54,8 +54,8 @@ const Phrase kReasons[] = {
      "these pictures, or calibrate the camera (twoview calibrate)"},
 };
 
-// Low parallax where the parallax is not low: it is the focal length that leaves the pose open.
-// The advice where nothing of the camera was given.
+// For the reason "low parallax" of a pair whose parallax is large: what leaves the pose open is the
+// focal length. kNoCamera: the advice where neither a camera nor a focal length was given.
 constexpr const char* kNoCamera =
     "the focal length is doubtful: give --focal-35mm where you know it, calibrate the camera "
     "(twoview calibrate), or estimate it from a film (twoview odometry)";

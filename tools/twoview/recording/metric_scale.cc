@@ -129,8 +129,9 @@ std::optional<MetricScale> scale_by_velocity(const FlightLog& log, double time0_
   MetricScale scale{"velocity", norm(way), sigma * (to - from)};
   if (!(scale.baseline_m > 3 * scale.sigma_m)) return {};
   if (unit_way) {
-    // Another direction than that of the pictures: what lies between the way and its part along
-    // theirs is uncertain.
+    // The measured way has another direction than that of the pictures. Its part along the
+    // pictures' direction is taken as the baseline, and the difference of the two lengths as
+    // uncertain.
     const double along = (time0_s <= time1_s ? 1 : -1) * dot(way, *unit_way);
     scale.sigma_m = std::hypot(scale.sigma_m, scale.baseline_m - along);
     scale.baseline_m = along;

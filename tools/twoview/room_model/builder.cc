@@ -206,7 +206,7 @@ bool RoomBuilder::prune() {
   return freed >= state.cap_blocks / kLeastShare;
 }
 
-// False where the memory is full, and stays so.
+// Returns false where the memory is full and nothing can be freed.
 bool RoomBuilder::fuse(const Map& map) {
   if (add(map)) return true;
   see_through();  // what an earlier call freed may have been measured again
@@ -269,8 +269,9 @@ void RoomBuilder::find_planes(RoomModel& model) const {
   find(&model.up);
 }
 
-// Lets the maps see through what was added after them. Returns how many of them can: a coarser
-// voxel has fixed the others, and they are no longer known by their pose.
+// Lets the maps see through surfaces that were added after them. Returns how many maps could: those
+// that were added before the voxels became coarser are part of the sums for good, and cannot be
+// used again.
 size_t RoomBuilder::see_through() {
   size_t num = 0;
   for (const Map& map : maps_) {
@@ -422,8 +423,8 @@ RoomModel RoomBuilder::finish() {
   const double before = cpu_ms();
   const bool all_see = see_through() == maps_.size();
   find_planes(model);
-  // What is inferred must stand up to all that was measured: not where memory ran out and a coarser
-  // voxel has fixed a map.
+  // Nothing is inferred where some maps cannot be used again, because the memory ran out and the
+  // voxels became coarser: what is inferred must agree with all that was measured.
   if (!settings_.measured_only && all_see) {
     infer(model);
     see_through();

@@ -26,7 +26,7 @@ class RoomBuilder {
   size_t num_done() const { return next_job_; }
   // The scene as it was given, but its camera is that of the pictures after they were scaled down.
   const RoomScene& scene() const { return scene_; }
-  // Of the pictures as they are given.
+  // The size of the pictures as they are given.
   cv::Size picture_size() const { return picture_size_; }
   // For what becomes known only while the pictures are read.
   void set_gravity(const Vector3& down) { scene_.gravity = down; }

@@ -9,8 +9,8 @@
 
 namespace cli {
 
-// The room as a section of a page, and the scripts that it needs after it. Both are empty of a
-// surface, but not of words, where there is none.
+// A section about the room for a page, and the scripts that follow it. Of a room without a surface
+// the section has words alone.
 struct RoomSection {
   std::string html, script;
 };

@@ -13,7 +13,7 @@ struct DepthRange {
   bool is_known() const { return near > 0; }
 };
 
-// By the scene's points that the view shows; not known with fewer than twenty of them.
+// The range by the scene's points that the view shows; not known where these are fewer than twenty.
 DepthRange depth_range(const RoomScene& scene, const RoomView& view);
 
 // Whether a view may be a partner of views near another one, which may then be one beside it: by a

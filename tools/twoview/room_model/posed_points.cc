@@ -107,8 +107,8 @@ void PosedPoints::confirm(const Pairs& pairs) {
 
 std::optional<double> PosedPoints::share_that_fits(const std::vector<Matrix3>& R,
                                                    const std::vector<Vector3>& t) const {
-  // Errors of poses shift what they put by a few pixels; what moves less than ten times that tells
-  // nothing else.
+  // Poses with errors move a match by a few pixels from where it should be. A match that moves less
+  // than ten times that between the pictures cannot tell such poses from wrong ones.
   constexpr double kLeast = 1.5, kOfMotion = 0.1, kOfWidth = 0.01;
   size_t num_pairs = 0, count = 0, fitting = 0;
   for (const Pairs& pairs : confirmed_) {

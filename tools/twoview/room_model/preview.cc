@@ -114,7 +114,8 @@ tv_status RoomPreview::with_room(const Map& map, const PreviewPlace& place, bool
   return (adds ? tv_room_add : tv_room_remove)(room_, &given);
 }
 
-// False where the room has begun anew for it, with voxels of twice the side.
+// Returns false where the memory was too small for the map, so that the room has begun anew with
+// voxels of twice the side.
 bool RoomPreview::fuse(Map& map) {
   const tv_status status = with_room(map, map.wanted, true);
   if (status == TV_ERR_CAPACITY) {
@@ -157,7 +158,7 @@ bool RoomPreview::has_moved(const Map& map) const {
 
 bool RoomPreview::settle() {
   int moves = 0;
-  // The newest first, which the page looks at.
+  // The newest first, since the page looks at them.
   for (size_t k = maps_.size(); k > 0; --k) {
     Map& map = *maps_[k - 1];
     if (!has_moved(map)) continue;

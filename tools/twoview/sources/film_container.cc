@@ -27,7 +27,8 @@ struct Close {
 };
 using Open = std::unique_ptr<AVFormatContext, Close>;
 
-// What the container says beside the stream; null where it is not there, or shorter than T.
+// Data of this type that the container stores with the stream; null where there is none, or less
+// than T takes.
 template <class T>
 const T* side_data(const AVStream& stream, AVPacketSideDataType type, size_t count = 1) {
 #if LIBAVFORMAT_VERSION_MAJOR >= 61

@@ -51,8 +51,8 @@ struct CameraOptions {
   ImageCameras cameras_of(const ImageFacts& image0, const ImageFacts& image1) const;
 };
 
-// The camera from which the focal length of a pair is estimated: as for 35 mm film that which is
-// most common, with the sigma of all that there are.
+// A camera with the most common focal length (as for 35 mm film), and with a standard deviation
+// that covers all usual ones: the start for estimating the focal length of a pair.
 ImageCamera camera_to_estimate(const ImageFacts& image);
 
 // A line that says which focal length EXIF gave; empty where it gave none.

@@ -36,8 +36,8 @@ void add_common(CLI::App& verb, Common& common, unsigned groups, const std::stri
 // It is noted where the mask leaves nothing out.
 void add_picture_mask(const std::string& name, Picture& picture, Common& common);
 
-// Scales the picture down as --resize says, or a large one by itself, which is noted. That a
-// picture of 16-bit samples was stretched is noted as well.
+// Scales the picture down as --resize says; without --resize, a large picture is scaled down and
+// this is noted. For a picture with 16-bit samples it is noted that these were stretched to 8 bits.
 void bring_to_size(Picture& picture, Common& common);
 
 // What a long search is doing, for Stopwatch.

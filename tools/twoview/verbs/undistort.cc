@@ -87,7 +87,7 @@ std::string camera_name(const Arguments& a) {
 
 constexpr size_t kMostNamed = 3;
 
-// Each with its reason, as long as these are few.
+// A line that names each image that was left out with its reason, if there are few.
 std::string left_out_note(const std::vector<LeftOut>& left_out) {
   const size_t count = left_out.size();
   std::string text =

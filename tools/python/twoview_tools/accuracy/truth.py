@@ -49,7 +49,8 @@ STATED = {
     "kitti00_turn": Stated("street", 0.65, 1.5),
     # "rectified to sub-pixel accuracy", focal length about 1000 px at the size in use
     "middlebury_bicycle": Stated("object", 0.05, 0.1),
-    # a calibrated gantry, no figure; templeSR's 0.42 and 0.34 for both
+    # the README names a calibrated gantry but no figure; 0.42 and 0.34 were measured for templeSR
+    # and serve for both sets
     "middlebury_dinoSR": Stated("object", 0.4, 0.35),
     "middlebury_templeSR": Stated("building", 0.4, 0.35),
     # "as given", which is no figure; 0.08 and 0.08

@@ -81,7 +81,8 @@ def evaluate(out, source):
                                             "num_loops", "scale", "scale_sigma",
                                             "context_bytes")},
     }
-    # Frames after the map's start without a pose of which the program did not say so.
+    # How many frames after the map's start have no pose although the program did not report them as
+    # lost.
     figures["num_unsaid_losses"] = sum(
         state.status in ("tracking", "weak") and time not in known
         for time, state in states.items())
