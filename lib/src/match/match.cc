@@ -154,10 +154,10 @@ void measure(const Query& query, int32_t rank, Group* group) {
                                    group->dists);
 }
 
-// The rank of the nearest descriptor of the side, of the lowest index of equal ones; the first
-// group of the list, without the descriptor that is listed, is written to *group. -1 if two equal
-// ones are so far apart that one of them is second nearest, whichever is the nearest: such a match
-// never passes.
+// Returns the rank of the nearest descriptor of the other side (of equally near ones, the one with
+// the lowest index), and writes the other members of its group to *group. Returns -1 if two equally
+// near descriptors are far enough apart for either to be the second neighbour of the other: then
+// the ratio is 1, and the match fails.
 int32_t nearest_of(const Query& query, Group* group) {
   const Side& side = *query.side;
   const tvk_nearest& list = *query.list;

@@ -125,8 +125,8 @@ bool pose_uncertainty(const RayPairs& pairs, const int32_t* indices, int count, 
   uncertainty->mean_weight = sums.weight / count;
   uncertainty->mean_slope = sums.slope / count - cut_slope;
   if (!(variance > 0)) return false;
-  // A = J' J holds J at the noisy pixels. A0, without what the noise adds to it, is the information
-  // of the points' motion alone: C = A0^-1 A A0^-1.
+  // A = J' J is computed at the noisy pixels. A0 is A less what the noise adds to it, that is, the
+  // information of the points' motion alone: C = A0^-1 A A0^-1.
   double noise[3];
   direction_noise(pairs, indices, count, pose, noise);
   double exact[15], A[25], half[25];

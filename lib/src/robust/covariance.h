@@ -13,9 +13,10 @@ struct PoseUncertainty {
   double variance_px;  // variance of the M-estimate for a residual: C = variance_px (J' J)^-1, px^2
   double mean_weight, mean_slope;  // means of the loss's weight and of psi' over the matches
   double focal_sigma;  // relative standard deviation of a refined focal length; else the given one
-  // Of the verdict: largest_sigma before errors that matches share and a calibration that is not
-  // refined are added, and direction_sigma with the former. With two cameras of uncertain focal
-  // length, rotation_sigma and direction_sigma with all of them.
+  // The standard deviations by which the verdict judges: largest_sigma of the noise alone, and
+  // direction_sigma with the errors that matches share. Where a focal length is uncertain and not
+  // refined, all errors count: sigma_rad is then at least rotation_sigma with them, and
+  // direction_sigma_rad is computed with them.
   double sigma_rad, direction_sigma_rad;
   CameraMisfit misfit;  // in the covariance; of a pose that was fitted with a plane not tested
 };

@@ -46,8 +46,9 @@ int32_t clamped(int32_t value, int32_t end) {
   return value < 0 ? 0 : value >= end ? end - 1 : value;
 }
 
-// The mean of 3 x 3 pixels, which takes two thirds of the noise. What lies outside is left out: its
-// edge is none of the scene.
+// Replaces each level by the mean of 3 x 3 pixels, which removes two thirds of the noise. A pixel
+// outside the image counts as the middle one, so that the outline of the image does not become an
+// edge.
 void smooth(const tv_depth_map& map, const Picture& picture) {
   for (int32_t y = 0; y < map.height; ++y) {
     for (int32_t x = 0; x < map.width; ++x) {

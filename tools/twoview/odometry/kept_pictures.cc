@@ -18,7 +18,7 @@ namespace {
 
 constexpr int kQuality = 95;  // of JPEG
 
-// What the map knows around the frame's keyframe.
+// The range of depth of the map's points around the frame's keyframe.
 DepthRange range_of(const Flight& flight, const RoomView& view, int32_t segment) {
   RoomScene scene;
   scene.camera = flight.camera();

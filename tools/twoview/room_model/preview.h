@@ -36,7 +36,7 @@ struct PreviewPlace {
 std::string surface_bytes(const std::vector<tv_room_vertex>& vertices,
                           const std::vector<tv_room_triangle>& triangles);
 
-// One thread uses it at a time.
+// It may be used by one thread at a time only.
 class RoomPreview {
  public:
   RoomPreview();

@@ -76,7 +76,7 @@ bool is_packed(AVStereo3DType type) {
 
 const std::string kPdf = "a PDF document";
 
-// What a file is by its first bytes where it is an archive or a document; else empty.
+// The kind of archive or document that the first bytes of a file show; empty for other files.
 std::string archive_kind(const std::string& path) {
   constexpr size_t kTarMark = 257;
   std::string head(512, '\0');
