@@ -16,11 +16,6 @@ constexpr double kMaxPixel = 1e6;  // of |x| + |y|; images have at most 16384 pi
 constexpr double kMaxPoint = 1e100;
 constexpr double kFarthest = 1e9;
 
-struct SortKey {
-  double key;  // the first coordinate, or the ratio
-  int32_t index;
-};
-
 // Whether match i is before match j by pixel, point and sigma: -1, 0 for equal ones, or 1.
 int compare(const SightingInput& in, int32_t i, int32_t j) {
   for (int k = 0; k < 5; ++k) {
@@ -39,30 +34,18 @@ bool is_before(const SightingInput& in, int32_t i, int32_t j) {
   return s != t ? s < t : i < j;
 }
 
-inline bool is_before(const SightingInput& in, const SortKey& a, const SortKey& b) {
+inline bool is_before(const SightingInput& in, const SightingKey& a, const SightingKey& b) {
   return a.key != b.key ? a.key < b.key : is_before(in, a.index, b.index);
 }
 
-// Sorts by merging runs, which is as fast as std::sort and a kilobyte shorter. Behind the keys
-// there is room for as many more.
-void sort(const SightingInput& in, SortKey* keys, int count) {
-  SortKey *from = keys, *to = keys + count;
-  for (int length = 1; length < count; length *= 2) {
-    for (int begin = 0; begin < count; begin += 2 * length) {
-      const int middle = std::min(begin + length, count), end = std::min(middle + length, count);
-      for (int k = begin, a = begin, b = middle; k < end; ++k) {
-        const bool first = b == end || (a < middle && is_before(in, from[a], from[b]));
-        to[k] = from[first ? a++ : b++];
-      }
-    }
-    std::swap(from, to);
-  }
-  if (from != keys) std::copy_n(from, count, keys);
+void sort(const SightingInput& in, SightingKey* keys, int count) {
+  std::sort(keys, keys + count,
+            [&in](const SightingKey& a, const SightingKey& b) { return is_before(in, a, b); });
 }
 
 // The matches in order[0 .. count), the most precise of equal ones first; the others last. Returns
 // how many differ.
-int sort_matches(const SightingInput& in, SortKey* keys, int count, int32_t* order) {
+int sort_matches(const SightingInput& in, SightingKey* keys, int count, int32_t* order) {
   sort(in, keys, count);
   int num = 0, repeats = 0;
   for (int k = 0; k < count; ++k) {
@@ -180,15 +163,14 @@ void prepare_sightings(const SightingInput& in, Arena& arena, Sightings* s) {
   const size_t padded = (n + kSightingBlock - 1) / kSightingBlock * kSightingBlock;
   for (float*& numbers : s->fast) numbers = arena_alloc<float>(arena, padded);
   ArenaScope scope(arena);
-  double* values = arena_alloc<double>(arena, 4 * n);
-  SortKey* keys = reinterpret_cast<SortKey*>(values);  // and room for as many
-  static_assert(sizeof(SortKey) <= 2 * sizeof(double), "the keys and the values share their bytes");
+  SightingKey* keys = arena_alloc<SightingKey>(arena, n);
+  double* values = arena_alloc<double>(arena, n);
   int count = 0;
   for (int i = 0; i < in.num; ++i) {
     const double *pixel = in.pixels + 2 * i, *point = in.points + 3 * i;
     if (std::fabs(pixel[0]) + std::fabs(pixel[1]) < kMaxPixel &&
         std::fabs(point[0]) + std::fabs(point[1]) + std::fabs(point[2]) < kMaxPoint) {
-      keys[count++] = SortKey{pixel[0], i};
+      keys[count++] = SightingKey{pixel[0], i};
     }
   }
   s->num_all = count;

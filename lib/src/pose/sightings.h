@@ -47,10 +47,16 @@ struct Sightings {
   double scale = 1;              // a power of two
 };
 
+// By which matches are sorted: the first coordinate of the pixel, or the ratio.
+struct SightingKey {
+  double key;
+  int32_t index;
+};
+
 inline size_t sightings_bytes(size_t n) {
   const size_t padded = (n + kSightingBlock - 1) / kSightingBlock * kSightingBlock;
   return arena_bytes<Sighting>(n) + arena_bytes<int32_t>(n) + 12 * arena_bytes<float>(padded) +
-         arena_bytes<double>(4 * n);
+         arena_bytes<SightingKey>(n) + arena_bytes<double>(n);
 }
 
 // Drops matches that are not finite or outside the lens model, or whose point is farther than 1e9
