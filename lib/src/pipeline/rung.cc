@@ -39,12 +39,12 @@ void extract_and_match(tv_context* context, const PairTask& task, PairArrays& ar
 }
 
 // Moves the keypoints of the matches by the pixels around them. A keypoint has at most one match.
-// Matches of guided matching are not aligned. It is called before the estimate, whose inlier mask
-// serves as scratch.
+// Matches of guided matching are not aligned.
 void align_found(tv_context* context, const PairTask& task, int32_t num_matches,
                  PairArrays& arrays) {
   StageTimer timer(context, TV_STAGE_MATCH);
-  uint8_t* const aligned = arrays.inlier_mask;
+  ArenaScope scope(context->arena);
+  uint8_t* const aligned = arena_alloc<uint8_t>(context->arena, static_cast<size_t>(num_matches));
   const tv_image images[2] = {task.views[0].image, task.views[1].image};
   align_matches(*context->kernels, images, static_cast<double>(task.features.keypoint_size),
                 arrays.keypoints, arrays.matches, num_matches, aligned);
