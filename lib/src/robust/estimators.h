@@ -57,6 +57,9 @@ struct FundamentalEstimator {
 // per cent chi-square is 3.84 with one degree of freedom, 5.99 with two.
 inline constexpr double kTransferThresholdScale = 1.2489995996796797;  // sqrt(5.99 / 3.84)
 
+// A match farther than this from a model, in thresholds, is clearly off it.
+inline constexpr double kClearlyOff = 3;
+
 // A homography from four rays, a rotation from two; over the listed matches only.
 struct TransferEstimator {
   const RayPairs& pairs;

@@ -315,16 +315,14 @@ bool has_opposite_motion(Fit& f) {
   return angle_of_pseudo(behind) > kParallaxRatio * angle_of_pseudo(front);
 }
 
-// A second model is searched only among the matches that are farther from the first than kClear
-// thresholds, so that it is no part of the first.
-constexpr double kClear = 3;
-
+// A second model is searched only among the matches that are clearly off the first, so that it is
+// no part of it.
 bool has_second_model(Fit& f, Arena& arena) {
   ArenaScope scope(arena);
   const TwoViewOutcome& out = *f.out;
   const int n = f.matches.num_unique();
   uint8_t* explained = arena_alloc<uint8_t>(arena, static_cast<size_t>(n));
-  const double limit = kClear * f.threshold;
+  const double limit = kClearlyOff * f.threshold;
   if (out.has_t) {
     sampson_squares(f.matches.pairs, 0, n, out.epipolar.M, f.values);
   } else {

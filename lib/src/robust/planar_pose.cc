@@ -21,6 +21,30 @@ bool matches_decide(const Fit& f, const Pose& rival, int num_inliers) {
   return difference > 0 && difference * difference > -2 * kLogMeaningful * apart;
 }
 
+// The cost of each pose without the matches of the plane: those that are not clearly off it nor off
+// the pose's epipolar line, and in front of both cameras. Each motion of a plane explains them, and
+// which one their residuals favour is up to noise and the camera's errors.
+TVK_NOINLINE void costs_off_plane(const Fit& f, const Mat3& H, const Pose* poses, int num_poses,
+                                  int64_t* costs) {
+  constexpr int kChunk = 64;
+  const RayPairs& pairs = f.matches.pairs;
+  const double threshold_sq = f.threshold * f.threshold,
+               limit_sq = kClearlyOff * kClearlyOff * threshold_sq;
+  double squares[kChunk];
+  transfer_squares(pairs, 0, pairs.num, H, f.values);
+  for (int p = 0; p < num_poses; ++p) {
+    costs[p] = 0;
+    for (int first = 0; first < pairs.num; first += kChunk) {
+      const int some = std::min(kChunk, pairs.num - first);
+      pose_squares(pairs, first, some, poses[p], f.threshold, squares);
+      for (int k = 0; k < some; ++k) {
+        if (std::max(f.values[first + k], squares[k]) <= limit_sq) continue;
+        costs[p] += static_cast<int64_t>(std::min(squares[k] / threshold_sq, 1.0) * kCostOne);
+      }
+    }
+  }
+}
+
 }  // namespace
 
 void choose_planar_pose(Fit& f, const Rivals& rivals) {
@@ -43,10 +67,12 @@ void choose_planar_pose(Fit& f, const Rivals& rivals) {
   }
   const PoseEstimator scorer{f.matches.pairs, f.threshold, f.indices, nullptr};
   int best = 0, inliers[3];
-  int64_t cost[3];
+  int64_t cost[3], off_plane[3];
+  costs_off_plane(f, rivals.H, poses, num_poses, off_plane);
   for (int k = 0; k < num_poses; ++k) {
     cost[k] = scorer.full_cost(poses[k], &inliers[k]);
-    best = cost[k] < cost[best] ? k : best;
+    const bool same = off_plane[k] == off_plane[best];
+    best = (same ? cost[k] < cost[best] : off_plane[k] < off_plane[best]) ? k : best;
   }
   out.epipolar.pose = poses[best];
   out.epipolar.M = essential_from_pose(poses[best]);
