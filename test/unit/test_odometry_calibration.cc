@@ -1,7 +1,7 @@
-// When and how the odometry moves the principal point (odometry/calibration.h,
+// When and how the odometry moves the principal point (odometry/move_principal_point.h,
 // docs/algorithms/odometry.md, "The camera's principal point").
 
-#include "odometry/calibration.h"
+#include "odometry/move_principal_point.h"
 
 #include <unity.h>
 
@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <cstring>
 
-#include "odometry/loop.h"
+#include "odometry/loop_closure.h"
 #include "odometry/map_check.h"
 #include "odometry/spread.h"
 #include "support/odometry_flight.h"

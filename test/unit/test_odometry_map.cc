@@ -10,11 +10,11 @@
 
 #include "odometry/adjust.h"
 #include "odometry/adjust_segment.h"
+#include "odometry/find_points.h"
 #include "odometry/keyframe.h"
-#include "odometry/loop.h"
+#include "odometry/loop_closure.h"
 #include "odometry/map.h"
 #include "odometry/path.h"
-#include "odometry/search.h"
 
 namespace {
 

@@ -94,7 +94,7 @@ void test_a_keyframe_of_another_segment_says_nothing() {
   TEST_ASSERT_TRUE(reaches(100, 2, 0));
 }
 
-// A loop that turns much is believed only then (odometry/loop.h, is_plausible).
+// A loop that turns much is believed only then (odometry/loop_closure.h, is_plausible).
 void test_a_lost_frame_that_is_found_again_is_remembered() {
   odometry = begin_room_flight(memory, sizeof memory);
   for (int n = 0; n < 39; ++n) {

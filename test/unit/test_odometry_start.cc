@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "odometry/search.h"
+#include "odometry/find_points.h"
 #include "odometry/start.h"
 #include "support/odometry.h"
 #include "support/random.h"

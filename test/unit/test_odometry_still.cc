@@ -1,7 +1,7 @@
-// What stands still in the picture of the odometry (odometry/still.h): text over a flight is found,
-// and what has gone is used again.
+// What stands still in the picture of the odometry (odometry/still_cells.h): text over a flight is
+// found, and what has gone is used again.
 
-#include "odometry/still.h"
+#include "odometry/still_cells.h"
 
 #include <unity.h>
 

@@ -5,7 +5,7 @@
 #include "api/validate.h"
 #include "api/within.h"
 #include "odometry/memory.h"
-#include "odometry/still.h"
+#include "odometry/still_cells.h"
 #include "odometry/track.h"
 #include "odometry/work.h"
 #include "pipeline/context.h"

@@ -6,7 +6,7 @@
 #include "api/within.h"
 #include "odometry/adjust.h"
 #include "odometry/keyframe.h"
-#include "odometry/loop.h"
+#include "odometry/loop_closure.h"
 #include "odometry/map_bytes.h"
 #include "odometry/work.h"
 #include "twoview/odometry.h"

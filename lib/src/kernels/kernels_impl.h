@@ -18,7 +18,7 @@
 #include "kernels/patch.h"
 #include "kernels/describe.h"
 #include "kernels/nearest.h"
-#include "kernels/window.h"
+#include "kernels/align_window.h"
 /* clang-format on */
 
 /* Exports a kernel of this file under a name by which the tables of other sets can use it. */

@@ -1,5 +1,5 @@
 // Bundle adjustment of many keyframes of a segment, in bounded steps: after a loop, no ten of them
-// can hold it closed. Tests: test/unit/test_loop.cc.
+// can hold it closed. Tests: test/unit/test_loop_closure.cc.
 #pragma once
 
 #include "odometry/odometry.h"

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 
+#include "odometry/find_points.h"
 #include "odometry/fit_pose.h"
 #include "odometry/keyframe.h"
 #include "odometry/metric.h"
-#include "odometry/search.h"
 #include "odometry/start.h"
 
 namespace tv {

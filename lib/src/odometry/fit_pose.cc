@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "odometry/search.h"
+#include "odometry/find_points.h"
 #include "pose/absolute_pose.h"
 #include "pose/reprojection.h"
 

@@ -8,8 +8,8 @@
 
 #include "base/math.h"
 #include "geometry/essential.h"
-#include "odometry/calibration.h"
 #include "odometry/metric.h"
+#include "odometry/move_principal_point.h"
 
 namespace tv {
 namespace {

@@ -1,6 +1,6 @@
 #include "odometry/map_check.h"
 
-#include "odometry/calibration.h"
+#include "odometry/move_principal_point.h"
 
 namespace tv {
 namespace {

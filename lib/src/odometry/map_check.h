@@ -2,7 +2,7 @@
 // docs/algorithms/odometry.md, "The map is checked". Tests: test/unit/test_map_check.cc.
 #pragma once
 
-#include "odometry/pair.h"
+#include "odometry/frame_pair.h"
 
 namespace tv {
 

@@ -131,7 +131,7 @@ struct MetricScale {
 };
 
 // A cell of the picture: the number of the first frame in which it is looked into again, and how
-// many times it was found to stand still (odometry/still.h).
+// many times it was found to stand still (odometry/still_cells.h).
 struct StillCell {
   int32_t until, num_times;
 };

@@ -1,6 +1,6 @@
 // What a loop, or a correction of the camera, leaves to the frames that follow: many keyframes are
 // adjusted together, a step a frame, and then the points alone, some at a frame.
-// docs/algorithms/odometry.md, "Queue of work". Tests: test/unit/test_loop.cc.
+// docs/algorithms/odometry.md, "Queue of work". Tests: test/unit/test_loop_closure.cc.
 #pragma once
 
 #include "odometry/odometry.h"

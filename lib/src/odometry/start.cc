@@ -3,9 +3,9 @@
 #include <algorithm>
 
 #include "odometry/adjust.h"
+#include "odometry/find_points.h"
+#include "odometry/frame_pair.h"
 #include "odometry/keyframe.h"
-#include "odometry/pair.h"
-#include "odometry/search.h"
 
 namespace tv {
 namespace {

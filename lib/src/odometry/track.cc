@@ -3,18 +3,18 @@
 #include <algorithm>
 #include <cmath>
 
-#include "odometry/calibration.h"
 #include "odometry/doubts.h"
 #include "odometry/find_frame.h"
+#include "odometry/find_points.h"
+#include "odometry/frame_pair.h"
 #include "odometry/keyframe.h"
-#include "odometry/loop.h"
+#include "odometry/loop_closure.h"
 #include "odometry/map_check.h"
 #include "odometry/metric.h"
-#include "odometry/pair.h"
-#include "odometry/search.h"
+#include "odometry/move_principal_point.h"
 #include "odometry/spread.h"
 #include "odometry/start.h"
-#include "odometry/still.h"
+#include "odometry/still_cells.h"
 #include "odometry/work.h"
 
 namespace tv {

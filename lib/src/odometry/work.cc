@@ -2,7 +2,7 @@
 
 #include "odometry/adjust.h"
 #include "odometry/keyframe.h"
-#include "odometry/loop.h"
+#include "odometry/loop_closure.h"
 #include "odometry/metric.h"
 #include "odometry/spread.h"
 

@@ -2,7 +2,7 @@
 // P. Sturm, "Triangulation", CVIU 68(2), 1997. Derivation: docs/algorithms/triangulation.md.
 #pragma once
 
-#include "triangulation/pair.h"
+#include "triangulation/triangulation_pair.h"
 
 namespace tv {
 

@@ -4,7 +4,7 @@
 #pragma once
 
 #include "geometry/camera.h"
-#include "triangulation/pair.h"
+#include "triangulation/triangulation_pair.h"
 #include "twoview/triangulate.h"
 
 namespace tv {

@@ -1,4 +1,4 @@
-#include "odometry/search.h"
+#include "odometry/find_points.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,9 +1,9 @@
-#include "odometry/pair.h"
+#include "odometry/frame_pair.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "odometry/still.h"
+#include "odometry/still_cells.h"
 
 namespace tv {
 namespace {

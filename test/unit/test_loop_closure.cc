@@ -1,6 +1,6 @@
-// What a loop does (odometry/loop.h): to the scale that sensors gave, with keyframes that see no
-// points; to the keyframes and points of an invented room (odometry/adjust_segment.h); and when few
-// points are believed.
+// What a loop does (odometry/loop_closure.h): to the scale that sensors gave, with keyframes that
+// see no points; to the keyframes and points of an invented room (odometry/adjust_segment.h); and
+// when few points are believed.
 
 #include <unity.h>
 
@@ -9,7 +9,7 @@
 #include <cstdlib>
 
 #include "odometry/adjust_segment.h"
-#include "odometry/loop.h"
+#include "odometry/loop_closure.h"
 #include "odometry/map.h"
 #include "odometry/metric.h"
 #include "odometry/spread.h"

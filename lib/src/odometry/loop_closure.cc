@@ -1,4 +1,4 @@
-#include "odometry/loop.h"
+#include "odometry/loop_closure.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,10 +8,10 @@
 #include "geometry/vector3.h"
 #include "odometry/adjust.h"
 #include "odometry/adjust_segment.h"
+#include "odometry/find_points.h"
 #include "odometry/fit_pose.h"
 #include "odometry/keyframe.h"
 #include "odometry/metric.h"
-#include "odometry/search.h"
 #include "odometry/spread.h"
 #include "odometry/start.h"
 

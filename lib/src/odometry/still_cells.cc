@@ -1,4 +1,4 @@
-#include "odometry/still.h"
+#include "odometry/still_cells.h"
 
 #include <algorithm>
 #include <cstring>

@@ -2,7 +2,7 @@
 // what the path drifted in position, attitude and scale, as in the pose chain of G. Dubbelman,
 // B. Browning, "COP-SLAM: closed-form online pose-chain optimization for visual SLAM", 2015, and
 // then adjusted together in the frames that follow. A segment that meets another one becomes part
-// of it. Tests: test/unit/test_loop.cc.
+// of it. Tests: test/unit/test_loop_closure.cc.
 #pragma once
 
 #include "odometry/odometry.h"

@@ -1,4 +1,4 @@
-#include "odometry/calibration.h"
+#include "odometry/move_principal_point.h"
 
 #include <algorithm>
 #include <cmath>
