@@ -118,6 +118,25 @@ class Match(cli.CliTest):
         self.assertGreater(found["2"]["right"], 2 * found["fixed"]["right"] + 20)
         self.assertEqual(found["auto"]["options"]["effort"], "auto")
 
+    def test_the_ladder_ends_early_where_no_view_can_help(self):
+        self.assert_refused(self.run_program("match", self.a, self.b, "-o", self.out, "--effort",
+                                             "4"), "--effort")
+        width, height = 160, 120
+        rows = [bytes(row) for row in cli.texture(width, height, seed=4)]
+        stripes = [bytes(200 * (x // 8 % 2) for x in range(width))] * height
+        small = [row[:40] for row in rows[:30]]
+        pictures = {"blank": [bytes(width)] * height, "striped": stripes, "tiny": small,
+                    "plain": rows}
+        paths = {name: self.write(f"{name}.png", cli.png(len(p[0]), len(p), b"".join(p)))
+                 for name, p in pictures.items()}
+        for name, other in (("blank", "plain"), ("striped", "striped"), ("plain", "plain"),
+                            ("tiny", "plain")):
+            done = self.succeed(self.run_program("match", paths[name], paths[other], "-o", self.out,
+                                                 "--json"))
+            result = json.loads(done.stdout)
+            found = result["effort"], len(result["timings_ms"]["rungs"])
+            self.assertEqual(found, (0, 1), (name, other))
+
     def test_bad_images_are_refused(self):
         done = self.run_program("match", self.a, "nowhere.png", "-o", self.out)
         self.assert_refused(done, "nowhere.png")

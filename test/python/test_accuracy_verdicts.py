@@ -1,5 +1,7 @@
 """Tests of twoview_tools.accuracy.verdicts: the choice of unrelated pairs, and what is counted."""
 
+import os
+import tempfile
 import unittest
 
 try:
@@ -48,6 +50,30 @@ class TestChoice(unittest.TestCase):
 
     def test_all_there_are_is_the_most(self):
         self.assertEqual(len(verdicts.choose_unrelated({"a": ["x"], "b": ["y", "z"]}, 10)), 2)
+
+
+class TestRows(unittest.TestCase):
+    def test_an_interrupted_run_goes_on_with_the_pairs_that_its_file_lacks(self):
+        pairs = [(("a", f"{i}.png"), ("b", "x.png")) for i in range(5)]
+        seen = []
+
+        def run(work):
+            seen.extend(work)
+            return [{"image0": "/".join(a), "image1": "/".join(b), "verdict": "refused"}
+                    for a, b in work]
+
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "rows.jsonl")
+            self.assertEqual(verdicts.kept_rows(path, pairs), ([], pairs))
+            verdicts.gather(run, [[pairs[2]], [pairs[0]]], 1, "a test", path)
+            kept, missing = verdicts.kept_rows(path, pairs)
+            self.assertEqual([row["image0"] for row in kept], ["a/0.png", "a/2.png"])
+            self.assertEqual(missing, [pairs[1], pairs[3], pairs[4]])
+            verdicts.gather(run, [missing], 1, "a test", path)
+            kept, missing = verdicts.kept_rows(path, pairs)
+            self.assertEqual(([row["image0"] for row in kept], missing),
+                             ([f"a/{i}.png" for i in range(5)], []))
+        self.assertEqual(sorted(seen), pairs)
 
 
 def rows(verdict, errors):

@@ -164,12 +164,28 @@ def _run_related(job):
     return rows
 
 
-def _gather(function, work, jobs, title):
+def gather(function, work, jobs, title, path=None):
+    """The rows of all pieces of work; with a path, those of each piece are appended to that file
+    as soon as it is done."""
     rows, report = [], tables.progress(title, log=True)
     for done, part in enumerate(parallel.run(function, work, jobs), 1):
         rows += part
+        if path:
+            with open(path, "a", encoding="utf-8") as file:
+                file.writelines(json.dumps(row) + "\n" for row in part)
         report(done, len(work))
     return rows
+
+
+def kept_rows(path, pairs):
+    """(the rows of those pairs that the file of an earlier run has, the pairs that it lacks)."""
+    kept = {}
+    if path and os.path.isfile(path):
+        with open(path, encoding="utf-8") as file:
+            kept = {(row["image0"], row["image1"]): row for row in map(json.loads, file)}
+    names = [tuple("/".join(image) for image in pair) for pair in pairs]
+    return ([kept[name] for name in names if name in kept],
+            [pair for pair, name in zip(pairs, names) if name not in kept])
 
 
 # ---- summaries -----------------------------------------------------------------------------------
@@ -253,6 +269,10 @@ def main(argv=None):
     parser.add_argument("--lib", help="libtwoview.so (default: build/release/lib)")
     parser.add_argument("--jobs", type=int, default=1, help="processes (default 1)")
     parser.add_argument("--json", metavar="F", help="write every pair")
+    parser.add_argument("--rows", metavar="F",
+                        help="append each unrelated pair to F, a JSON object a line, as soon as it "
+                             "is done; those that F has, of the same library and options, are not "
+                             "run again")
     parser.add_argument("--check", action="store_true",
                         help="exit status 1 when a line says NOT REACHED")
     arguments = parser.parse_args(argv)
@@ -269,14 +289,15 @@ def main(argv=None):
     if arguments.pairs:
         images = {os.path.basename(f): images_of(datasets.Set(f, flagged=True)) for f in folders}
         pairs = choose_unrelated(images, arguments.pairs)
-        work = [(text, pairs[i:i + CHUNK]) for i in range(0, len(pairs), CHUNK)]
-        rows = _gather(_run_unrelated, work, arguments.jobs, "unrelated")
+        kept, missing = kept_rows(arguments.rows, pairs)
+        work = [(text, missing[i:i + CHUNK]) for i in range(0, len(missing), CHUNK)]
+        rows = kept + gather(_run_unrelated, work, arguments.jobs, "unrelated", arguments.rows)
         reached, counts, sentence = summarise_unrelated(rows)
         print_unrelated(rows, counts)
         lines.append((reached, sentence))
         result["unrelated"] = rows
     if arguments.related:
-        rows = _gather(_run_related, [(text, name) for name in names], arguments.jobs, "related")
+        rows = gather(_run_related, [(text, name) for name in names], arguments.jobs, "related")
         reached, table, wrong, sentence = summarise_related(rows)
         print_related(rows, table, wrong)
         lines.append((reached, sentence))
