@@ -52,15 +52,18 @@ struct Window {
   Pair* Z;  // L^-1 W', 9 for each observation: a point's have three rows of its slots
   EliminatedPoint* eliminated;
   BlockMatrix system;
-  // Points to the entries of `system`, and holds half the gradient of the cost, both after the
-  // points are eliminated.
+  // Points to the entries and to the diagonal of `system`, and has an array of its own for half the
+  // gradient of the cost. The entries and the gradient are those after the points are eliminated,
+  // the diagonal is the one before.
   tvk_reduced_system reduced;
   double* step;
 };
 
-// Gathers the observations, as far as they can be used, by point and view, and counts the others.
-// `order` has as many entries as there are observations; `begin` one more than there are views and
-// points.
+// Writes the observations that can be used to window->observations, sorted by point and, within a
+// point, by view; points that fewer than two views see are left out. Counts in the window's result
+// what is left out. `planes`: two numbers for each observation, or null. `order` and `begin` are
+// scratch: as many entries as there are observations, and one more than the larger of the numbers
+// of views and of points.
 void gather_points(Window* window, const Camera* cameras, const double* planes, int32_t* order,
                    int32_t* begin, tv_window_result* result);
 

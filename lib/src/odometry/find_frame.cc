@@ -28,8 +28,10 @@ bool track_points(Odometry* odometry, const int32_t* points, int32_t num, const 
   return true;
 }
 
-// With a pose that is known to a few pixels: looks for all points again, close to their predicted
-// places. If `counts`, the points' counts of searches and finds are raised.
+// From a pose that is known to a few pixels: looks for all local points again, within 5 pixels of
+// where they must appear, and fits the pose anew. `counts`: whether num_visible of the points
+// within the picture is raised (num_found is raised later, for those that the frame keeps). False
+// where the pose does not hold.
 bool refine_track(Odometry* odometry, bool counts, Frame* frame, PoseFit* fit) {
   const PointSearch search{odometry->local_points, odometry->num_local_points, fit->cam_from_world,
                            5.0, counts};

@@ -7,8 +7,9 @@
 
 namespace tv {
 
-// Marks the cells of the matches whose pixel is the same in both frames as still, but only if the
-// pair's estimate has left such matches out (tv_two_view.num_still).
+// For each match whose pixel is the same in both frames, within a threshold, marks all cells that
+// the cores of its two descriptors cover as still. It is called only for a pair whose estimate left
+// such matches out (tv_two_view.num_still > 0).
 void mark_still(Odometry* odometry, const tv_keypoint* keypoints0, const tv_keypoint* keypoints1,
                 const tv_correspondence* matches, int32_t num);
 

@@ -16,11 +16,12 @@ bool try_point(const BundleProblem& problem, const BundleFrame& old_frame, const
                const double step[5], bool careful, const BundleMatch& match, int32_t i,
                BundleMatch* out);
 
-// Lowers the error of the i-th match's point at the present pose while a step gains more than a
-// millionth of it, and returns the point's elimination. A step can gain about |error|^2 - r^2. For
-// a correct match this is nearly 0, since the projections are nearly linear over its few pixels.
-// Points of wrong matches take several steps; without these steps the whole adjustment would
-// converge slowly.
+// Moves the i-th match's point at the present pose, by at most four steps, while one can be
+// expected to lower its squared error by more than a millionth, and does lower it; returns the
+// point's elimination. What can be expected is |error|^2 - r^2, r the elimination's: the error that
+// no position of the point removes. For a correct match this is nearly 0, since the projections are
+// nearly linear over its few pixels. Points of wrong matches take several steps; without these
+// steps the whole adjustment would converge slowly.
 Elimination polish_point(const BundleProblem& problem, const BundleFrame& frame, int32_t i,
                          BundleMatch* match);
 

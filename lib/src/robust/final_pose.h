@@ -45,8 +45,10 @@ struct PlaneFit {
 int refine_on_plane(const PoseRefiner& refiner, const Mat3& H, const Vec3& mean_ray0,
                     PlaneFit* fit);
 
-// The standard deviation of normal noise, estimated from the median residual of those of the first
-// `count` matches in refiner.indices that lie within the threshold of M.
+// The standard deviation of the noise in pixels: 1.4826 times the median of the absolute residuals
+// under M, as for a normal distribution, over those of the first `count` matches in refiner.indices
+// whose residual is at most the threshold (where the distribution is cut off, which is not
+// corrected for). The threshold, where there is none.
 double median_noise_px(const PoseRefiner& refiner, const Mat3& M, int count);
 
 // The final loss around a model of which `count` matches are listed in refiner.indices.

@@ -39,18 +39,18 @@ bool low_inlier_ratio(const Support& s, bool has_model) {
 // CROWDED_MATCHES of all poses: the inliers lie in at most 4 of the 64 cells of a grid.
 bool has_few_cells(double coverage) { return coverage < 4.5 / 64; }
 
-// LOW_PARALLAX: the direction of t is not determined well enough. The median parallax is below 3
-// thresholds or 10 standard deviations of the noise; or the noise gives the rotation or the
-// direction a standard deviation above 1.25 degrees or an unknown one: a pose that is "ok" is off
-// by 5 degrees only by an accident of four of them
-// (docs/decisions/0007-verdict-and-covariance.md); or the direction's standard deviation, with the
-// errors that matches share, is above 13.5 degrees: by its own covariance it is then about as
-// likely as not off by more than 10 degrees (46 per cent where the error has one axis, 58 where it
-// has none; docs/decisions/0007-verdict-and-covariance.md).
-//
-// Or the focal length is open by more than an eighth, and with it the shape of all that is computed
-// from the pose: a data sheet leaves 0.1, and a pair at least 0.15 of one of which nothing was
-// known (0.5; final_pose.cc, kFocalFloor).
+// LOW_PARALLAX, in each of four cases (docs/decisions/0007-verdict-and-covariance.md):
+// - The median parallax is below 3 thresholds, or below 10 standard deviations of the noise.
+// - The noise gives the rotation or the direction of t a standard deviation above 1.25 degrees, or
+//   an unknown one. Up to there an error of 5 degrees, which counts as wrong, is one of at least
+//   four standard deviations.
+// - The standard deviation of the direction, with the errors that matches share, is above 13.5
+//   degrees: then it is off by more than 10 degrees with a probability of 46 per cent where its
+//   error lies along one line, and of 58 per cent where it is alike in all directions.
+// - The relative standard deviation of the focal length is above 1/8, and with it that of the shape
+//   of all that is computed from the pose. A focal length of a data sheet has 0.1, which is enough;
+//   one of which nothing was known begins at 0.5, and no pair brings it below 0.15 (final_pose.cc,
+//   kFocalFloor).
 bool low_parallax(const Evidence& e) {
   constexpr double kMostDirectionSigma = 13.5 * kPi / 180;
   constexpr double kMostFocalSigma = 0.125;

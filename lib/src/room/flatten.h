@@ -1,4 +1,5 @@
-// Surface that lies on a plane of the room is drawn to it. docs/algorithms/room.md.
+// Vertices that may lie on a plane of the room are moved towards it, by as much as the standard
+// deviations of both say. docs/algorithms/room.md.
 #pragma once
 
 #include "room/blocks.h"

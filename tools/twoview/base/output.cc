@@ -152,8 +152,8 @@ void OutputSet::add(const std::string& name, std::string_view bytes) {
   Descriptor file;
   const int flags = O_WRONLY | O_CLOEXEC | (direct ? O_APPEND : O_CREAT | O_EXCL | O_NOFOLLOW);
   {
-    // open() may block on a pipe. A target that is no regular file needs no temporary file, so the
-    // mutex is not locked for it.
+    // open() may block on a pipe, and nobody may wait for it meanwhile: a target that is no regular
+    // file has no temporary file that could be left behind, and the mutex is locked after open().
     std::unique_lock<std::mutex> lock(living().mutex, std::defer_lock);
     if (!direct) lock.lock();
     file.fd = ::open(path.c_str(), flags, 0666);

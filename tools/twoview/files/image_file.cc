@@ -125,7 +125,8 @@ cv::Mat decode(const std::string& path, const std::string& bytes) {
                    (header.width > 0 ? " is damaged" : " is no image that can be read"));
   }
   refuse_huge(pixels.cols, pixels.rows);
-  // OpenCV (4.6 to 5.0) scales 8-bit PNM files of numbers by their largest sample, binary ones not.
+  // OpenCV (4.6 to 5.0) makes the largest sample of a PNM file's header 255 where its samples are
+  // text (P2, P3), and leaves binary ones (P5, P6) as they are: those are scaled here.
   if (header.is_binary_pnm && header.max_sample > 0 && header.max_sample < 255)
     pixels = to_8_bits<uint8_t>(pixels, 0, header.max_sample);
   return pixels;

@@ -277,8 +277,9 @@ std::vector<cv::Point2d> directions_of(const std::vector<Piece>& planes) {
   return found;
 }
 
-// Whether two pieces are of one surface: they face the same side, and where they lie beside each
-// other they are as far apart as their standard deviations allow.
+// Whether two pieces are of one surface: they face the same side, their directions agree within
+// three standard deviations, along the wall they overlap or leave a gap of at most kGapVoxels, and
+// in the middle of that overlap or gap they are at most three standard deviations apart.
 bool are_one(const Piece& a, const Piece& b, double voxel) {
   if (a.normal.dot(b.normal) < 0.9) return false;
   const double turn = std::abs(std::asin(a.normal.cross(b.normal)));

@@ -38,7 +38,8 @@ OFF_S = 1.5
 AUTOPILOTS = {"PX4": (0.1, 0.1, 5.0, 3.0, 0.35, 0.003),
               "ArduPilot": (0.2, 0.1, 5.0, 5.0, 0.35, 0.02)}
 TIMEOUT_S = 5.0  # of refused estimates, after which the filter starts anew from the next one
-# Of the simulated accelerometer: noise of a sample (25 Hz) and bias, m/s^2.
+# Of the simulated accelerometer, in m/s^2: the standard deviations of each sample's noise (25
+# samples a second), and of the constant bias, which is drawn once a run for each axis.
 ACCELEROMETER = (0.1, 0.05)
 
 
