@@ -374,7 +374,7 @@ class tv_room_plane(Structure):
 
 
 class tv_room_plane_options(Structure):
-    _fields_ = [("struct_size", c_uint32), ("reserved", c_int32), ("min_area", c_double),
+    _fields_ = [("struct_size", c_uint32), ("min_maps_behind", c_int32), ("min_area", c_double),
                 ("gravity", c_double * 3), ("gravity_sigma_rad", c_double)]
 
 

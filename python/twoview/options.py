@@ -184,6 +184,7 @@ class RoomMeshOptions(_Options):
 class RoomPlaneOptions(_Options):
     """The options of Room.find_planes, as in tv_room_plane_options."""
 
+    min_maps_behind: int = 1  #: fewest maps that saw what lies behind a plane, [1, 255]
     min_area: float = 0.0  #: of a plane, in squares of the unit; 0: 640 squares of a voxel's side
     gravity: Sequence[float] = (0.0, 0.0, 0.0)  #: its direction in the world; zeros: not known
     gravity_sigma_rad: float = 0.02  #: standard deviation of that direction

@@ -415,7 +415,9 @@ static void test_planes_are_refused_and_found(void) {
   o.min_area = -1;
   TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_room_find_planes(room, &o, planes, 4, &num));
   tv_room_plane_options_init(&o);
-  o.reserved = 1;
+  o.min_maps_behind = -1;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_room_find_planes(room, &o, planes, 4, &num));
+  o.min_maps_behind = 256;
   TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_room_find_planes(room, &o, planes, 4, &num));
   tv_room_plane_options_init(&o);
   o.gravity[1] = INFINITY;

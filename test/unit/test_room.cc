@@ -598,10 +598,11 @@ struct Planes {
   int32_t num;
 };
 
-Planes find_planes(tv_room* room, bool with_gravity) {
+Planes find_planes(tv_room* room, bool with_gravity, int32_t min_maps_behind = 1) {
   Planes found;
   tv_room_plane_options options;
   tv_room_plane_options_init(&options);
+  options.min_maps_behind = min_maps_behind;
   if (with_gravity) options.gravity[2] = -9.81;
   TEST_ASSERT_EQUAL(
       TV_OK, tv_room_find_planes(room, &options, found.planes, TV_ROOM_MAX_PLANES, &found.num));
@@ -811,6 +812,23 @@ void test_a_plane_is_not_carried_where_farther_things_were_measured() {
   TEST_ASSERT_EQUAL(0, num);
 }
 
+// What one map alone saw behind a wall is no evidence that the room goes on there.
+void test_what_one_map_saw_behind_a_wall_counts_only_where_one_is_enough() {
+  Map first = wall_at(2, Vec3(0, 0, 0), 0.02f);
+  const Map second = wall_at(2, Vec3(0.05, 0, 0), 0.02f);
+  for (size_t k = 0; k < first.distance.size(); ++k)
+    if (k % 160 >= 140) first.distance[k] *= 1.5f;
+  box_room::aim(&first);
+  tv_room* room = new_room();
+  TEST_ASSERT_EQUAL(TV_OK, add(room, first));
+  TEST_ASSERT_EQUAL(TV_OK, add(room, second));
+  const Planes of_one = find_planes(room, false, 1), of_two = find_planes(room, false, 2);
+  TEST_ASSERT_TRUE(of_one.num >= 1 && of_two.num == of_one.num);
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, -2, of_one.planes[0].offset);
+  TEST_ASSERT_TRUE(of_one.planes[0].share_behind > 0.03);
+  TEST_ASSERT_EQUAL_DOUBLE(0, of_two.planes[0].share_behind);
+}
+
 // A plain wall through a lens whose corners are black, with texture in stripes alone: the wall is
 // carried up to the edge of what the lens shows and not into the corners, which are plain as well.
 void test_a_plane_is_carried_to_the_edge_of_the_mask_and_no_farther() {
@@ -945,6 +963,7 @@ int main(void) {
   RUN_TEST(test_surface_on_a_plane_is_drawn_to_it_and_other_surface_stays);
   RUN_TEST(test_surface_of_a_large_sigma_is_left_out_when_wanted);
   RUN_TEST(test_a_plane_is_not_carried_where_farther_things_were_measured);
+  RUN_TEST(test_what_one_map_saw_behind_a_wall_counts_only_where_one_is_enough);
   RUN_TEST(test_a_plane_is_carried_to_the_edge_of_the_mask_and_no_farther);
   RUN_TEST(test_an_inferred_wall_that_a_map_sees_through_vanishes);
   RUN_TEST(test_an_inferred_wall_takes_few_blocks_for_the_same_surface);

@@ -1,6 +1,8 @@
 // The entry points of the room: they validate, and call the stages of lib/src/room.
 #include "twoview/room.h"
 
+#include <algorithm>
+
 #include "api/sized.h"
 #include "api/validate.h"
 #include "api/within.h"
@@ -20,7 +22,7 @@ constexpr tv_room_options kDefaults = {sizeof(tv_room_options), 3, 0.03, 0.0};
 constexpr tv_room_mesh_options kMeshDefaults = {
     sizeof(tv_room_mesh_options), 1, 64, 0, {0, 0, 0}, {0, 0, 0}, nullptr, 0, 0, 0};
 constexpr tv_room_plane_options kPlaneDefaults = {
-    sizeof(tv_room_plane_options), 0, 0, {0, 0, 0}, 0.02};
+    sizeof(tv_room_plane_options), 1, 0, {0, 0, 0}, 0.02};
 constexpr tv_room_infer_options kInferDefaults = {sizeof(tv_room_infer_options), 3, nullptr, 0, 0};
 
 tv_status read_options(const tv_room_options* given, tv_room_options* options) {
@@ -89,13 +91,14 @@ tv_status read_plane_request(const tv_room& room, const tv_room_plane_options* g
     return TV_ERR_NOT_FINITE;
   }
   const double voxel = room.options.voxel;
-  *request = {o.min_area > 0 ? o.min_area : kLeastArea * voxel * voxel,
+  *request = {std::max(o.min_maps_behind, 1),
+              o.min_area > 0 ? o.min_area : kLeastArea * voxel * voxel,
               false,
               {0, 0, 0},
               o.gravity_sigma_rad};
   request->has_gravity = up_of(o.gravity, request->up);
-  const bool valid =
-      o.reserved == 0 && o.min_area >= 0 && o.gravity_sigma_rad > 0 && o.gravity_sigma_rad <= 1;
+  const bool valid = within(o.min_maps_behind, 0, kMostMinMaps) && o.min_area >= 0 &&
+                     o.gravity_sigma_rad > 0 && o.gravity_sigma_rad <= 1;
   return valid ? TV_OK : TV_ERR_ARGUMENT;
 }
 

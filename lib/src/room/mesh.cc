@@ -371,9 +371,9 @@ void count_mesh(tv_room& room, const MeshRequest& request, int64_t* num_vertices
   }
 }
 
-void make_surfels(tv_room& room) {
+void make_surfels(tv_room& room, int32_t min_maps) {
   Sample grid[kGrid * kGrid * kGrid];
-  const MeshRequest request = {1, 0, true, {}, {}, nullptr, 0, 0};
+  const MeshRequest request = {min_maps, 0, true, {}, {}, nullptr, 0, 0};
   const float voxel = static_cast<float>(room.options.voxel);
   for (int32_t index = 0; index < room.end_blocks; ++index) {
     Surfel& surfel = room.surfels[index];

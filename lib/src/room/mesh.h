@@ -34,7 +34,7 @@ void count_mesh(tv_room& room, const MeshRequest& request, int64_t* num_vertices
 // Writes the mesh that was counted last, less the pieces that are too small.
 void write_mesh(tv_room& room, const MeshRequest& request, MeshOutput* output);
 
-// Computes the surfel of each block from its measured surface.
-void make_surfels(tv_room& room);
+// Computes the surfel of each block from the surface that min_maps maps measured.
+void make_surfels(tv_room& room, int32_t min_maps);
 
 }  // namespace tv

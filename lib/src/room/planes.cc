@@ -44,10 +44,14 @@ Plane plane_of(const Surfel& s) {
 }
 
 // The distance of a block's surface from the plane, on the free side above 0.
-double distance_from(const Plane& plane, const Surfel& s) {
+double distance_from(const double normal[3], double offset, const Surfel& s) {
   const double at[3] = {static_cast<double>(s.mean[0]), static_cast<double>(s.mean[1]),
                         static_cast<double>(s.mean[2])};
-  return dot(plane.normal, at) - plane.offset;
+  return dot(normal, at) - offset;
+}
+
+double distance_from(const Plane& plane, const Surfel& s) {
+  return distance_from(plane.normal, plane.offset, s);
 }
 
 bool belongs(const Plane& plane, const Surfel& s, double voxel) {
@@ -245,16 +249,17 @@ int32_t kind_of(const PlaneRequest& request, const double normal[3]) {
   return along > kLevelCosine ? TV_ROOM_PLANE_LEVEL : TV_ROOM_PLANE_OTHER;
 }
 
-// Which share of the measured surface lies behind the plane.
-double share_behind(const tv_room& room, const Plane& plane) {
+// Which share of the surface of the surfels at hand lies behind the plane.
+double share_behind(const tv_room& room, const tv_room_plane& plane) {
   double all = 0, behind = 0;
   for (int32_t k = 0; k < room.end_blocks; ++k) {
     const Surfel& s = room.surfels[k];
     const double area = static_cast<double>(s.area);
     all += area;
-    if (distance_from(plane, s) < -kBehindVoxels * room.options.voxel) behind += area;
+    const double distance = distance_from(plane.normal, plane.offset, s);
+    if (distance < -kBehindVoxels * room.options.voxel) behind += area;
   }
-  return behind / all;
+  return all > 0 ? behind / all : 0;
 }
 
 }  // namespace
@@ -274,7 +279,7 @@ bool up_of(const double gravity[3], double up[3]) {
 
 int32_t find_planes(tv_room& room, const PlaneRequest& request, tv_room_plane* planes,
                     int32_t cap) {
-  make_surfels(room);
+  make_surfels(room, 1);
   for (int32_t k = 0; k < room.end_blocks; ++k) {
     room.surfels[k].plane = room.surfels[k].area > 0 ? kOfNone : kIgnored;
   }
@@ -304,9 +309,10 @@ int32_t find_planes(tv_room& room, const PlaneRequest& request, tv_room_plane* p
     out->offset = plane.offset;
     out->area = area;
     out->sigma = std::sqrt(fit.spread);
-    out->share_behind = share_behind(room, plane);
     out->kind = kind_of(request, plane.normal);
   }
+  if (request.min_maps_behind > 1) make_surfels(room, request.min_maps_behind);
+  for (int32_t k = 0; k < num; ++k) planes[k].share_behind = share_behind(room, planes[k]);
   return num;
 }
 

@@ -9,6 +9,7 @@ namespace tv {
 inline constexpr double kLeastArea = 640;
 
 struct PlaneRequest {
+  int32_t min_maps_behind;  // that have seen what lies behind a plane
   double min_area;
   bool has_gravity;
   double up[3];  // unit vector, where gravity is known

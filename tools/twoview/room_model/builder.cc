@@ -256,6 +256,7 @@ void RoomBuilder::find_planes(RoomModel& model) const {
   const auto find = [&](const Vector3* up) {
     tv_room_plane_options options;
     tv_room_plane_options_init(&options);
+    options.min_maps_behind = fewest_maps();
     if (up != nullptr)
       for (size_t axis = 0; axis < 3; ++axis) options.gravity[axis] = -(*up)[axis];
     model.planes.resize(TV_ROOM_MAX_PLANES);
@@ -320,13 +321,17 @@ void RoomBuilder::infer(RoomModel& model) {
   }
 }
 
+int32_t RoomBuilder::fewest_maps() const {
+  return std::min(kFewestMaps, std::max(1, static_cast<int32_t>(maps_.size())));
+}
+
 RoomMesh RoomBuilder::mesh(const RoomModel& model) const {
   tv_room_mesh_options options;
   tv_room_mesh_options_init(&options);
   options.measured_only = settings_.measured_only ? 1 : 0;
   options.planes = model.planes.data();
   options.num_planes = static_cast<int32_t>(model.planes.size());
-  options.min_maps = std::min(kFewestMaps, std::max(1, static_cast<int32_t>(maps_.size())));
+  options.min_maps = fewest_maps();
   RoomMesh mesh;
   tv_room_state state;
   tv_room_state_init(&state);

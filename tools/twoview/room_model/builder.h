@@ -54,6 +54,8 @@ class RoomBuilder {
   void fuse_newest();
   void fill(const Map& map, tv_depth_map& out);
   void find_up(RoomModel& model) const;
+  // That must have seen a surface: two, where there are two.
+  int32_t fewest_maps() const;
   void find_planes(RoomModel& model) const;
   size_t see_through();
   void infer(RoomModel& model);

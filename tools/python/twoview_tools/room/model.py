@@ -156,7 +156,7 @@ def make(flight, settings=Settings(), depth_of=depth_of):
     begin = time.process_time()
     fusion.see_through()
     room = fusion.room
-    planes = room.find_planes()
+    planes = room.find_planes(min_maps_behind=settings.min_maps)
     if not settings.measured_only:
         fusion.infer(planes)
     mesh = room.mesh(measured_only=settings.measured_only, min_maps=settings.min_maps,

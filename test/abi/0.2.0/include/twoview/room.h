@@ -236,8 +236,8 @@ typedef struct tv_room_plane {
   double area;
   /* The root mean square of the distances of its blocks' surfaces from it. */
   double sigma;
-  /* Which share of the measured surface lies behind it by more than four voxels, [0, 1]: next to
-     nothing for a wall of the room, and more for a table or a cupboard. */
+  /* Which share of the measured surface (min_maps_behind) lies behind it by more than four voxels,
+     [0, 1]: next to nothing for a wall of the room, and more for a table or a cupboard. */
   double share_behind;
   /* A tv_room_plane_kind. */
   int32_t kind;
@@ -301,8 +301,10 @@ TV_API tv_status tv_room_mesh(tv_room *room, const tv_room_mesh_options *options
 typedef struct tv_room_plane_options {
   /* The caller's sizeof, set by tv_room_plane_options_init. */
   uint32_t struct_size;
-  /* Must be 0. */
-  int32_t reserved;
+  /* The fewest maps that have seen the surface that counts as lying behind a plane (share_behind),
+     [0, 255], default 1; 0 is 1. With the min_maps of tv_room_mesh_options it is the surface of the
+     mesh: what one map alone saw is often noise, and a wall has much of it behind. */
+  int32_t min_maps_behind;
   /* The least area of a plane that was measured, in squares of the unit of the poses; 0 (default):
      640 squares of a voxel's side, 0.58 square metres at 3 cm. */
   double min_area;
