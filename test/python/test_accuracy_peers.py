@@ -48,6 +48,19 @@ class TestFrontEnd(unittest.TestCase):
         self.assertGreater(shares["gradient"], 0.4)
         self.assertLess(shares["upright"], 0.02)
 
+    def test_affine_views_match_a_wall_from_the_side_better_than_one_view(self):
+        wall = texture(12)
+        side = cv2.resize(cv2.GaussianBlur(wall, (0, 0), sigmaX=1.3, sigmaY=0.01),
+                          (wall.shape[1] // 3, wall.shape[0]), interpolation=cv2.INTER_AREA)
+        right = {}
+        for config in (peers.SIFT, {**peers.ASIFT, "cap": 2000}):
+            (p0, d0), (p1, d1) = (peers.extract(g, config) for g in (wall, side))
+            self.assertLessEqual(len(p0), 2048)
+            i0, i1, _ = peers.match(d0, d1)
+            away = p1[i1] * [3, 1] + [1, 0] - p0[i0]
+            right[config["front"]] = np.count_nonzero(np.hypot(*away.T) < 4)
+        self.assertGreater(right["asift"], 3 * max(right["sift"], 3))
+
     def test_keeps_the_cap_and_the_strongest(self):
         points = np.array([[x, y] for y in range(0, 100) for x in range(0, 100)], float)
         scores = np.random.default_rng(2).permutation(len(points)).astype(float)

@@ -25,6 +25,9 @@ CACHE_DIR = os.path.join(datasets.ROOT, ".cache", "accuracy")
 FAST = {"front": "fast", "threshold": 10, "size": 5, "orientation": "upright", "grid": 0,
         "descriptor": "sift"}
 SIFT = {"front": "sift", "contrast": 0.02, "descriptor": "rootsift"}
+# What OpenCV has against wide baselines: ASIFT's 43 views (J.-M. Morel, G. Yu, SIAM J. Imaging
+# Sciences 2009), the strongest 20 000 keypoints of all of them.
+ASIFT = {**SIFT, "front": "asift", "contrast": 0.04, "cap": 20000}
 COLMAP = {"front": "pycolmap"}
 _FASTS = [FAST, {**FAST, "size": 4}, {**FAST, "orientation": "gradient"},
           {**FAST, "threshold": 5, "orientation": "gradient", "grid": 64}]
@@ -38,6 +41,9 @@ FAMILIES = {
     "fast_poselib": ("poselib", _FASTS),
     "sift": ("magsac", _SIFTS),
     "poselib": ("poselib", _SIFTS[:2]),
+    "sift8192": ("poselib", [{**SIFT, "cap": 8192}]),
+    "asift": ("poselib", [ASIFT]),
+    "asift_magsac": ("magsac", [ASIFT]),
     "colmap": ("poselib", [COLMAP]),
     "pycolmap": ("pycolmap", [COLMAP]),
     "pycolmap_tvg": ("pycolmap_tvg", [COLMAP]),
@@ -52,9 +58,11 @@ def describe(config, threshold_px=1.0, ratio=RATIO):
     if config["front"] == "fast":
         front = (f"OpenCV {version('cv2')} FAST9 t{config['threshold']} s{config['size']} "
                  f"{config['orientation']}{' grid' if config['grid'] else ''}")
-    elif config["front"] == "sift":
+    elif config["front"] in ("sift", "asift"):
         kind = {"sift": "SIFT", "rootsift": "RootSIFT"}[config["descriptor"]]
-        front = f"OpenCV {version('cv2')} {kind} c{config['contrast']:g}"
+        views = "AffineFeature of " if config["front"] == "asift" else ""
+        cap = f" {config['cap']}" if config.get("cap", CAP) != CAP else ""
+        front = f"OpenCV {version('cv2')} {views}{kind} c{config['contrast']:g}{cap}"
     else:
         front = f"COLMAP {version('pycolmap')} SIFT"
     title, module, _ = estimators.PEERS[config["estimator"]]
@@ -134,8 +142,10 @@ def extract(gray, config):
         return _extract_pycolmap(gray, cap)
     import cv2
     cv2.setNumThreads(1)
-    if config["front"] == "sift":
+    if config["front"] in ("sift", "asift"):
         sift = cv2.SIFT_create(nfeatures=cap, contrastThreshold=config["contrast"])
+        if config["front"] == "asift":
+            sift = cv2.AffineFeature_create(sift)
         keypoints, descriptors = sift.detectAndCompute(gray, None)
         if len(keypoints) > cap:  # OpenCV returns more than cap if scores are equal
             best = np.argsort([-k.response for k in keypoints], kind="stable")[:cap]
