@@ -279,7 +279,7 @@ bool up_of(const double gravity[3], double up[3]) {
 
 int32_t find_planes(tv_room& room, const PlaneRequest& request, tv_room_plane* planes,
                     int32_t cap) {
-  make_surfels(room, 1);
+  make_surfels(room, 1);  // a ceiling that was seen once bounds the walls, too
   for (int32_t k = 0; k < room.end_blocks; ++k) {
     room.surfels[k].plane = room.surfels[k].area > 0 ? kOfNone : kIgnored;
   }

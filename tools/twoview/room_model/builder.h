@@ -54,7 +54,7 @@ class RoomBuilder {
   void fuse_newest();
   void fill(const Map& map, tv_depth_map& out);
   void find_up(RoomModel& model) const;
-  // That must have seen a surface: two, where there are two.
+  // How many maps must have seen a surface that is kept: two, where there are two maps.
   int32_t fewest_maps() const;
   void find_planes(RoomModel& model) const;
   size_t see_through();
