@@ -13,12 +13,12 @@ import time
 
 import numpy as np
 
-from . import datasets, estimators, leaveout, metrics, parallel, tables
+from . import datasets, estimators, leaveout, learned, metrics, parallel, tables
 
 CAP = 2048  # most descriptors of an image; a keypoint with two orientations has two
 RATIO = 0.8
 BLOCK = 64  # rows of a matrix of distances that are processed together
-CACHE_FORMAT = 3  # increase it if a change here changes the cached results
+CACHE_FORMAT = 4  # increase it if a change here changes the cached results
 
 CACHE_DIR = os.path.join(datasets.ROOT, ".cache", "accuracy")
 
@@ -29,6 +29,7 @@ SIFT = {"front": "sift", "contrast": 0.02, "descriptor": "rootsift"}
 # Sciences 2009), the strongest 20 000 keypoints of all of them.
 ASIFT = {**SIFT, "front": "asift", "contrast": 0.04, "cap": 20000}
 COLMAP = {"front": "pycolmap"}
+LEARNED = {"front": "learned", "long_side": 0}  # 0: images as they are; the packages' own is 1024
 _FASTS = [FAST, {**FAST, "size": 4}, {**FAST, "orientation": "gradient"},
           {**FAST, "threshold": 5, "orientation": "gradient", "grid": 64}]
 _SIFTS = [SIFT, {**SIFT, "contrast": 0.04}, {**SIFT, "descriptor": "sift"},
@@ -44,6 +45,12 @@ FAMILIES = {
     "sift8192": ("poselib", [{**SIFT, "cap": 8192}]),
     "asift": ("poselib", [ASIFT]),
     "asift_magsac": ("magsac", [ASIFT]),
+    "xfeat": ("poselib", [{**LEARNED, "kind": "xfeat"}]),
+    "xfeat_lighterglue": ("poselib", [{**LEARNED, "kind": "lighterglue"}]),
+    "aliked_lightglue": ("poselib", [{**LEARNED, "kind": "aliked"},
+                                     {**LEARNED, "kind": "aliked", "long_side": 1024}]),
+    "disk_lightglue": ("poselib", [{**LEARNED, "kind": "disk"},
+                                   {**LEARNED, "kind": "disk", "long_side": 1024}]),
     "colmap": ("poselib", [COLMAP]),
     "pycolmap": ("pycolmap", [COLMAP]),
     "pycolmap_tvg": ("pycolmap_tvg", [COLMAP]),
@@ -63,13 +70,16 @@ def describe(config, threshold_px=1.0, ratio=RATIO):
         views = "AffineFeature of " if config["front"] == "asift" else ""
         cap = f" {config['cap']}" if config.get("cap", CAP) != CAP else ""
         front = f"OpenCV {version('cv2')} {views}{kind} c{config['contrast']:g}{cap}"
+    elif config["front"] == "learned":
+        front = learned.describe(config)
     else:
         front = f"COLMAP {version('pycolmap')} SIFT"
     title, module, _ = estimators.PEERS[config["estimator"]]
     title = title.replace("OpenCV ", "")
     if module == "poselib":
         title = title.replace("PoseLib", f"PoseLib {version(module)}")
-    return f"{front} r{ratio:g} + {title} {threshold_px:.1f}"
+    tested = "" if config["front"] == "learned" else f" r{ratio:g}"
+    return f"{front}{tested} + {title} {threshold_px:.1f}"
 
 
 # ---- keypoints and descriptors of the peers ---------------------------------------------------
@@ -281,11 +291,14 @@ class Peer:
         self.name = describe(config, threshold_px, ratio)
         modules = {"cv2", {"pycolmap": "pycolmap"}.get(config["front"], "cv2"),
                    estimators.PEERS[config["estimator"]][1]}
+        versions = {m: estimators.module_version(m) for m in sorted(modules)}
+        if config["front"] == "learned":
+            versions |= learned.versions()
         self.key = {"config": config, "threshold_px": threshold_px, "cap": CAP, "ratio": ratio,
                     "confidence": estimators.CONFIDENCE,
                     "max_iterations": estimators.MAX_ITERATIONS, "format": CACHE_FORMAT,
                     "numpy": np.__version__,
-                    "versions": {m: estimators.module_version(m) for m in sorted(modules)}}
+                    "versions": versions}
 
     def pair_key(self, data, pair):
         cameras = [data.camera(pair, i) for i in (0, 1)]
@@ -326,20 +339,22 @@ class Peer:
 
     def matches(self, data, pair, shared):
         """(estimators.Matches, ms of extraction, ms of matching, mean number of keypoints) of a
-        pair. `shared`: as in run."""
+        pair, in CPU time. `shared`: as in run."""
+        if self.config["front"] == "learned":
+            return self._learned_matches(data, pair, shared)
         features = shared.setdefault("features", {})
         for name in (pair.name0, pair.name1):
             if name not in features:
-                start = time.perf_counter()
+                start = time.process_time()
                 found = extract(data.gray(name)[0], self.config)
-                features[name] = found, 1e3 * (time.perf_counter() - start)
+                features[name] = found, 1e3 * (time.process_time() - start)
         ((points0, d0), ms0), ((points1, d1), ms1) = features[pair.name0], features[pair.name1]
         colmap = self.config["front"] == "pycolmap"
         links = shared.setdefault("links", {})
         if pair.text not in links:  # found once without a ratio test; they serve every ratio
-            start = time.perf_counter()
+            start = time.process_time()
             found = match_angles(d0, d1) if colmap else match(d0, d1, 1.0)
-            links[pair.text] = found, 1e3 * (time.perf_counter() - start)
+            links[pair.text] = found, 1e3 * (time.process_time() - start)
         (index0, index1, ratios), match_ms = links[pair.text]
         keep = ratios < self.ratio
         index0, index1, ratios = index0[keep], index1[keep], ratios[keep]
@@ -348,14 +363,27 @@ class Peer:
                                    (data.camera(pair, 0), data.camera(pair, 1)), sizes, ratios)
         return found, ms0 + ms1, match_ms, (len(points0) + len(points1)) / 2
 
+    def _learned_matches(self, data, pair, shared):
+        links = shared.setdefault("links", {})
+        names = pair.name0, pair.name1
+        grays = [data.gray(name)[0] for name in names]
+        if pair.text not in links:
+            if "learned" not in shared:
+                shared["learned"] = learned.Matcher(
+                    learned.command(self.config, self.config.get("cap", CAP)))
+            links[pair.text] = shared["learned"].match(names, grays)
+        points0, points1, *figures = links[pair.text]
+        return (estimators.Matches(points0, points1, (data.camera(pair, 0), data.camera(pair, 1)),
+                                   [gray.shape[::-1] for gray in grays]), *figures)
+
     def _run_pair(self, data, pair, shared):
         matches, extract_ms, match_ms, num_keypoints = self.matches(data, pair, shared)
         share = metrics.precision(matches.rays0, matches.rays1, pair.R, pair.t)
         rows = []
         for seed in range(self.num_seeds):
-            start = time.perf_counter()
+            start = time.process_time()
             found = estimators.run_peer(self.config["estimator"], matches, self.threshold_px, seed)
-            estimate_ms = 1e3 * (time.perf_counter() - start)
+            estimate_ms = 1e3 * (time.process_time() - start)
             R, t, inliers = found or (None, None, 0)
             rows.append(metrics.finite(
                 {"seed": seed, "num_keypoints": num_keypoints, "num_matches": len(matches),
@@ -374,7 +402,8 @@ def options_of(family, best, cap=CAP):
     if not best:
         return [({**fronts[0], **capped, "estimator": estimator}, RATIO, 1.0)]
     return [({**front, **capped, "estimator": estimator}, ratio, threshold)
-            for front in fronts for ratio in RATIOS for threshold in THRESHOLDS_PX]
+            for front in fronts for ratio in ((RATIO,) if front["front"] == "learned" else RATIOS)
+            for threshold in THRESHOLDS_PX]
 
 
 def _run_front(job):
