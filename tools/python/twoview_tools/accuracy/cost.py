@@ -14,7 +14,7 @@ import json
 
 import numpy as np
 
-from . import datasets, metrics, tables
+from . import datasets, learned, metrics, tables
 
 OURS = {"0": "twoview, one view", "auto": "twoview, automatic"}
 
@@ -62,7 +62,17 @@ def print_summaries(summaries):
         tables.say(f"| {name} | {' | '.join(cells)} | {parts['mean']['ms']:.0f} |")
 
 
-def draw(summaries, picture):
+def label(config):
+    """A peer's short name: its front end."""
+    if config["front"] == "learned":
+        return learned.TITLES[config["kind"]]
+    front = {"asift": "ASIFT", "sift": "SIFT", "fast": "FAST + SIFT",
+             "pycolmap": "COLMAP"}[config["front"]]
+    return f"{front} {config['cap']}" if "cap" in config else front
+
+
+def draw(summaries, labels, picture):
+    """labels: {name of a peer: its name in the picture}."""
     import matplotlib
     matplotlib.use("Agg")
     from matplotlib import pyplot
@@ -74,9 +84,11 @@ def draw(summaries, picture):
         x, y = parts["mean"]["ms"], parts["mean"]["5"]
         is_ours = name in OURS.values()
         axis.plot(x, y, "o" if is_ours else "s", color="tab:blue" if is_ours else "tab:red")
-        short = name.split(" (")[0] if " (scm" in name else name.split(" r0")[0]
-        axis.annotate(short, (x, y), xytext=(0, 6), textcoords="offset points", ha="center",
-                      fontsize=8)
+        # Ours above and below their line, the others to the left of their points.
+        place = {"xytext": (0, -14 if (x, y) == ours[0] else 6), "ha": "center"} if is_ours else {
+            "xytext": (-7, 0), "ha": "right", "va": "center"}
+        axis.annotate(labels.get(name, name), (x, y), textcoords="offset points", fontsize=8,
+                      **place)
     axis.set_xscale("log")
     axis.margins(x=0.18, y=0.12)
     axis.set_xlabel("CPU time of a pair, one thread [ms]")
@@ -99,7 +111,8 @@ def main(argv=None):
     summaries = {name: summarise(rows) for name, rows in systems(*contents).items()}
     print_summaries(summaries)
     if arguments.picture:
-        draw(summaries, arguments.picture)
+        labels = {name: label(key["config"]) for name, key in contents[0]["peers"].items()}
+        draw(summaries, labels, arguments.picture)
 
 
 if __name__ == "__main__":
