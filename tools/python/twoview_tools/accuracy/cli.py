@@ -140,8 +140,8 @@ def compare_pipelines(arguments, sets):
                         f"{reports[data.name]['auc'][t]:.3f}, from its pairs {value:.3f}")
     names = [OURS] + [peer.name for peer in systems]
     means = print_means(summaries, names)
-    say("\nmatches: mean; ms: median of a pair, one thread (peers: CPU time); fail: pairs without a "
-        "pose.\n"
+    say("\nmatches: mean; ms: median of a pair, one thread (peers: CPU time); fail: pairs without "
+        "a pose.\n"
         f"Peers: mean over {arguments.seeds} seeds that shuffle the matches; their gradient "
         "orientation and\nmatching run in numpy, so their ms are no measure of OpenCV's speed: "
         "scripts/bench is.")
