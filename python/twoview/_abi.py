@@ -252,7 +252,8 @@ class tv_odometry_frame(Structure):
                 ("time_s", c_double), ("world_from_cam", c_double * 9),
                 ("attitude_sigma_rad", c_double), ("height_m", c_double),
                 ("height_sigma_m", c_double), ("velocity_m_s", c_double * 3),
-                ("velocity_sigma_m_s", c_double), ("mask", tv_image)]
+                ("velocity_sigma_m_s", c_double), ("mask", tv_image),
+                ("previous_from_cam", c_double * 9), ("turn_sigma_rad", c_double)]
 
 
 class tv_odometry_state(Structure):

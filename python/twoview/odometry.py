@@ -119,7 +119,9 @@ class Odometry:
               height_m: float = 0.0, height_sigma_m: float = 0.0,
               velocity_m_s: Any = (0.0, 0.0, 0.0),
               velocity_sigma_m_s: float = 0.0,
-              mask: Optional[np.ndarray] = None) -> OdometryState:
+              mask: Optional[np.ndarray] = None,
+              previous_from_cam: Optional[np.ndarray] = None,
+              turn_sigma_rad: float = 0.0) -> OdometryState:
         """tv_odometry_track: tracks a frame, and extends and adjusts the map.
 
         image: (height, width) uint8, of the camera's size. time_s: later than that of the frame
@@ -127,17 +129,20 @@ class Odometry:
         anew. world_from_cam: (3, 3), the vehicle's
         attitude in a world whose z axis points down. Measurements with a sigma of 0 do not
         exist. mask: None, or uint8 or bool of the image's shape, 0 where the picture is left
-        out."""
+        out. previous_from_cam: (3, 3), the turn since the frame before as a gyro measured it."""
         frame = self.library.make(_abi.tv_odometry_frame, {
             "gap": int(gap), "time_s": time_s, "attitude_sigma_rad": attitude_sigma_rad,
             "height_m": height_m, "height_sigma_m": height_sigma_m, "velocity_m_s": velocity_m_s,
-            "velocity_sigma_m_s": velocity_sigma_m_s})
+            "velocity_sigma_m_s": velocity_sigma_m_s, "turn_sigma_rad": turn_sigma_rad})
         frame.image = _abi.check_image("image", image)
         if mask is not None:
             frame.mask = _abi.check_mask("mask", mask, image)
         if world_from_cam is not None:
             R = _abi.small_array("world_from_cam", world_from_cam, 3, 3)
             frame.world_from_cam[:] = R.ravel().tolist()
+        if previous_from_cam is not None:
+            R = _abi.small_array("previous_from_cam", previous_from_cam, 3, 3)
+            frame.previous_from_cam[:] = R.ravel().tolist()
         state = self.library.make(_abi.tv_odometry_state)
         self._call("tv_odometry_track", byref(frame), byref(state))
         return _state(state)

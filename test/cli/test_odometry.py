@@ -974,7 +974,12 @@ distortion_coefficients: [0, 0, 0, 0]
                             (mount + "nan" + sample[1:], ("line 2", "no time")),
                             (mount + sample.replace("0.01", "-1"), ("line 2", "negative")),
                             (mount + sample.replace(" 1 ", " 0 ", 1), ("line 2", "length 0")),
-                            (mount + sample + sample, ("line 3", "not later"))):
+                            (mount + sample + sample, ("line 3", "not later")),
+                            (mount + "gyro 0 0 0 0\n", ("line 2", "4 numbers after gyro")),
+                            (mount + "gyro nan 0 0 0 1\n", ("line 2", "no time")),
+                            (mount + "gyro 0 0 0 0 -1\n", ("line 2", "negative")),
+                            (mount + "gyro 0 0 200 0 1\n", ("line 2", "in degrees?")),
+                            (mount + 2 * "gyro 0 0 0 0 1\n", ("line 3", "not later"))):
             self.write("set/imu.txt", text)
             self.assert_refused(self.odometry(source), "imu.txt", *words)
         (source / "imu.txt").unlink()

@@ -78,6 +78,11 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       for (double& v : frame.velocity_m_s) v = given.wild(-2, 2);
       frame.velocity_sigma_m_s = given.wild(0, 1);
     }
+    if (given.whole(0, 3) == 1) {
+      for (int c = 0; c < 3; ++c) frame.previous_from_cam[4 * c] = 1;
+      frame.previous_from_cam[given.whole(0, 8)] += given.wild(-1e-9, 1e-9);
+      frame.turn_sigma_rad = given.wild(0, 0.1);
+    }
     Flown flown[2];
     std::vector<uint8_t> maps[2];
     const int also = given.whole(0, 40);

@@ -156,6 +156,13 @@ typedef struct tv_odometry_frame {
      corners on a used pixel are kept. Null data (default): all of the picture is used. Its pixels
      are read during the call only. */
   tv_image mask;
+  /* How the camera turned since the frame before, as a gyro measured it (tv_integrate_gyro): the
+     row-major rotation previous_from_cam, and the standard deviation of each component of its error
+     in radians, without that of a constant offset of the rates, which the odometry estimates; 0
+     (default): there is no turn. With a turn at each frame, also of those whose picture shows
+     nothing, fast turns are followed, and frames without usable picture have the attitude that the
+     gyro gives (TV_ODOMETRY_ROTATION). */
+  double previous_from_cam[9], turn_sigma_rad;
 } tv_odometry_frame;
 
 /* Writes zeros, and the size, into a struct of struct_size bytes; null is allowed. Programs call
@@ -163,6 +170,30 @@ typedef struct tv_odometry_frame {
 TV_API void tv_odometry_frame_init_sized(tv_odometry_frame *frame, size_t struct_size);
 /* Writes zeros, and struct_size; null is allowed. */
 #define tv_odometry_frame_init(frame) tv_odometry_frame_init_sized((frame), sizeof *(frame))
+
+/* What a gyro measured at one time. The layout never changes. */
+typedef struct tv_gyro_sample {
+  /* The time in seconds, by the clock of the frames. */
+  double time_s;
+  /* The rates of turn about the camera's axes (x right, y down, z ahead), in radians per second. */
+  double rate_rad_s[3];
+} tv_gyro_sample;
+
+/* Integrates a gyro's rates over the time from begin_s to end_s, that of a frame and of the next
+   one: the turn that tv_odometry_frame takes.
+   samples: num of rising times, at least two; the first at begin_s or earlier, the last at end_s or
+   later. Between two samples the rate is linear. sigma_rad_s: the standard deviation of the white
+   noise of each component of a sample.
+   previous_from_cam, turn_sigma_rad: the rotation from the camera at end_s to that at begin_s,
+   row-major, and the standard deviation of each component of its error, equal on all axes.
+   Returns TV_ERR_NULL, TV_ERR_NOT_FINITE, TV_ERR_ARGUMENT (num, sigma_rad_s below 0, a rate above
+   1000 rad/s), TV_ERR_TIME (times that do not rise, or samples that do not reach from begin_s to
+   end_s); nothing is written then. Time: the samples within, and a pass over all. Thread-safe.
+   S. Blanes, F. Casas, J. A. Oteo and J. Ros, "The Magnus expansion and some of its applications",
+   2009 (fourth order). */
+TV_API tv_status tv_integrate_gyro(const tv_gyro_sample *samples, int32_t num, double sigma_rad_s,
+                                   double begin_s, double end_s, double previous_from_cam[9],
+                                   double *turn_sigma_rad);
 
 /* What is known after a frame. */
 typedef struct tv_odometry_state {

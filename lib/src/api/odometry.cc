@@ -4,6 +4,7 @@
 #include "api/sized.h"
 #include "api/validate.h"
 #include "api/within.h"
+#include "odometry/gyro.h"
 #include "odometry/memory.h"
 #include "odometry/still_cells.h"
 #include "odometry/track.h"
@@ -50,6 +51,22 @@ tv_status check_frame_image(const tv_odometry& odometry, const tv_image& image) 
 tv_status check_frame_mask(const tv_image* mask, const tv_image& image) {
   const tv_status status = check_mask(mask, image);
   return status == TV_ERR_ARGUMENT ? TV_ERR_MASK : status;
+}
+
+constexpr double kMostRate = 1000, kMostSeconds = 1000;  // radians per second; of a turn
+
+tv_status check_samples(const tv_gyro_sample* samples, int32_t num, double begin_s, double end_s) {
+  for (int32_t k = 0; k < num; ++k) {
+    const tv_gyro_sample& s = samples[k];
+    if (!is_finite(s.time_s) || !all_finite(s.rate_rad_s, 3)) return TV_ERR_NOT_FINITE;
+    for (double rate : s.rate_rad_s) {
+      if (!(rate >= -kMostRate && rate <= kMostRate)) return TV_ERR_ARGUMENT;
+    }
+    if (k > 0 && !(s.time_s > samples[k - 1].time_s)) return TV_ERR_TIME;
+  }
+  const bool reach = begin_s < end_s && samples[0].time_s <= begin_s &&
+                     samples[num - 1].time_s >= end_s && end_s - begin_s <= kMostSeconds;
+  return reach ? TV_OK : TV_ERR_TIME;
 }
 
 // Whether a state that is written overlaps what is read.
@@ -116,6 +133,21 @@ tv_status tv_odometry_init(tv_odometry** odometry, const tv_camera* camera,
 tv_status tv_odometry_reset(tv_odometry* odometry) {
   if (odometry == nullptr) return TV_ERR_NULL;
   tv::start_anew(odometry);
+  return TV_OK;
+}
+
+tv_status tv_integrate_gyro(const tv_gyro_sample* samples, int32_t num, double sigma_rad_s,
+                            double begin_s, double end_s, double previous_from_cam[9],
+                            double* turn_sigma_rad) {
+  if (samples == nullptr || previous_from_cam == nullptr || turn_sigma_rad == nullptr)
+    return TV_ERR_NULL;
+  if (!tv::is_finite(sigma_rad_s) || !tv::is_finite(begin_s) || !tv::is_finite(end_s))
+    return TV_ERR_NOT_FINITE;
+  if (num < 2 || sigma_rad_s < 0) return TV_ERR_ARGUMENT;
+  const tv_status status = tv::check_samples(samples, num, begin_s, end_s);
+  if (status != TV_OK) return status;
+  tv::write_matrix(tv::integrated(samples, num, sigma_rad_s, begin_s, end_s, turn_sigma_rad),
+                   previous_from_cam);
   return TV_OK;
 }
 

@@ -23,6 +23,8 @@ void start_anew(tv_odometry* o) {
   o->num_frames = o->segment = o->num_segments = o->other_segment = 0;
   o->num_relocations = o->num_loops = o->next_search = o->next_loop = 0;
   o->tracking = {TrackingState::kStarting, 0};
+  o->gyro = Gyro{};
+  o->gyro.bias_variance = kGyroBiasSigma * kGyroBiasSigma;
   o->frame.has_pose = o->previous.has_pose = false;
   o->frame.num = o->previous.num = 0;
   o->median_depth = 1;

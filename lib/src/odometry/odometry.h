@@ -130,6 +130,21 @@ struct MetricScale {
   double sigma;  // relative; 0 where the source is TV_SCALE_UNIT
 };
 
+// The offset of a gyro's rates before it was measured, in radians per second: small MEMS gyros are
+// specified up to 5 degrees per second after their own calibration.
+inline constexpr double kGyroBiasSigma = 0.09;
+
+// What a gyro says beyond the last frame with a pose (odometry/gyro.h).
+struct Gyro {
+  bool is_held;
+  Rigid cam_from_world;  // of the newest frame: turned by the gyro, moved by the velocities
+  double turn_variance;  // of each component of its turn since that frame
+  double seconds;        // since that frame
+  // The constant offset of the rates, on the camera's axes in radians per second, and the variance
+  // of each component.
+  double bias[3], bias_variance;
+};
+
 // A cell of the picture: the number of the first frame in which it is looked into again, and how
 // many times it was found to stand still (odometry/still_cells.h).
 struct StillCell {
@@ -177,6 +192,7 @@ struct tv_odometry {
   // These follow each other in a map's bytes, too.
   int32_t num_frames, num_segments, num_relocations, num_loops;
   tv::Tracking tracking;
+  tv::Gyro gyro;
   int32_t next_search;  // the number of the keyframe from which a lost frame is looked for next
   int32_t next_loop;    // one more than that of the keyframe in which a loop is looked for next
   int32_t keyframe_inliers;  // how many points the last keyframe saw when it was adjusted

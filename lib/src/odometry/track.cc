@@ -7,6 +7,7 @@
 #include "odometry/find_frame.h"
 #include "odometry/find_points.h"
 #include "odometry/frame_pair.h"
+#include "odometry/gyro.h"
 #include "odometry/keyframe.h"
 #include "odometry/loop_closure.h"
 #include "odometry/map_check.h"
@@ -24,6 +25,7 @@ namespace {
 // kFarTurned radians since the last one, and earlier where few of its points are left.
 constexpr double kFarMoved = 0.10, kFarTurned = 0.25, kLeastMoved = 0.02, kLeastTurned = 0.08;
 constexpr int32_t kFewInliers = 100;
+constexpr int32_t kFewKeypoints = 20;  // fewer can give no pose
 constexpr int32_t kLoopKeyframes = 2;  // that are searched for a loop at each frame
 // Frames are weak while the keyframes' attitudes are so uncertain together, in radians.
 constexpr double kMostDrift = 0.026;
@@ -165,6 +167,7 @@ bool finish_tracked(Odometry* odometry, const PoseFit& fit, bool follows, bool g
   if (!heed_velocities(odometry, *frame, &state->map_reasons)) return false;
   state->attitude_ignored = !check_attitude(*odometry, frame);
   odometry->turn_sigma = turn_sigma_of(fit.estimate.covariance, 6);
+  if (follows) measure_bias(odometry, *frame);
   // The path jumps here, because the map was moved since the last tracked frame.
   if (odometry->was_moved_far) state->map_reasons |= TV_MAP_REASON_JUMPED;
   odometry->was_moved_far = false;
@@ -289,7 +292,9 @@ TrackingEvent place_frame(Odometry* odometry, bool has_gap, Frame* frame,
   if (may_try(tracking, TrackingEvent::kTurned) && follow_turn(odometry, frame)) {
     event = TrackingEvent::kTurned;
   }
-  if (may_try(tracking, TrackingEvent::kBegan) && begin_segment(odometry, frame, state)) {
+  // While the gyro holds the attitude, the camera may return to the map.
+  const bool waits = odometry->gyro.is_held && event == TrackingEvent::kTurned;
+  if (!waits && may_try(tracking, TrackingEvent::kBegan) && begin_segment(odometry, frame, state)) {
     return TrackingEvent::kBegan;
   }
   if (event == TrackingEvent::kTurned) state->reasons = TV_REASON_PURE_ROTATION;
@@ -308,10 +313,14 @@ void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry
   frame->time_s = input.time_s;
   read_sensors(input, frame);
   add_reach(odometry, *frame, input.gap != 0);
+  hold_turn(odometry, input, *frame);
   clear_state(*frame, state);
   Tracking* tracking = &odometry->tracking;
   if (odometry->map.num_keyframes == 0) tracking->state = TrackingState::kStarting;
+  const int32_t num_away = tracking->num_away;
   move_on(place_frame(odometry, input.gap != 0, frame, state), tracking);
+  // A picture that shows nothing was not looked for, and the gyro's turn is as good after it.
+  if (odometry->gyro.is_held && frame->num < kFewKeypoints) tracking->num_away = num_away;
   frame->has_pose = has_pose(tracking->state);
   // The list of local points is of the keyframes in which the frame was not found, and not of the
   // reference keyframe.

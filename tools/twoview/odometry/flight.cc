@@ -194,12 +194,32 @@ void Flight::tell_source() {
   told_ = state_;
 }
 
+// Whether a picture is as even as one of a covered or dazzled camera, but for noise.
+bool shows_nothing(const cv::Mat& luma) {
+  constexpr double kMostNoise = 5;  // grey values, standard deviation
+  cv::Scalar mean, sigma;
+  cv::meanStdDev(luma, mean, sigma);
+  return sigma[0] < kMostNoise;
+}
+
+// The tracker takes the turn since the frame that it was given before.
+void Flight::add_turn(const SourceFrame& frame) {
+  if (!frame.previous_from_cam) {
+    turn_.reset();
+    return;
+  }
+  if (!turn_) return;
+  turn_->previous_from_cam = product(turn_->previous_from_cam, *frame.previous_from_cam);
+  turn_->sigma_rad = std::hypot(turn_->sigma_rad, frame.turn_sigma_rad);
+}
+
 void Flight::track_frame(SourceFrame frame) {
   const bool is_first = odometry_ == nullptr;
   FlightFrame record;
   record.index = frame.index;
   record.name = frame.name;
   record.time_s = frame.time_s;
+  add_turn(frame);
   try {
     if (frame.luma.empty()) throw BadInput(frame.problem);
     if (is_first) start(frame);
@@ -215,7 +235,8 @@ void Flight::track_frame(SourceFrame frame) {
     frames_.push_back(record);
     return;
   }
-  if (repeated_.is_repeated(frame.luma, frames_.size())) {
+  // A picture that shows nothing is none that was stored twice: the tracker turns on by the gyro.
+  if (!(turn_ && shows_nothing(frame.luma)) && repeated_.is_repeated(frame.luma, frames_.size())) {
     record.withheld = true;
     record.status = lost_status();
     frames_.push_back(record);
@@ -260,6 +281,12 @@ void Flight::give(const SourceFrame& frame, FlightFrame& record) {
     std::copy(frame.velocity_m_s->begin(), frame.velocity_m_s->end(), input.velocity_m_s);
     input.velocity_sigma_m_s = frame.velocity_sigma_m_s;
   }
+  if (turn_) {
+    const Matrix3& turn = turn_->previous_from_cam;
+    std::copy(turn.begin(), turn.end(), input.previous_from_cam);
+    input.turn_sigma_rad = turn_->sigma_rad;
+  }
+  turn_ = Turn{};
   const double before = cpu_ms();
   check(tv_odometry_track(odometry_, &input, &state_), "frame " + frame.name);
   record.time_ms = cpu_ms() - before;

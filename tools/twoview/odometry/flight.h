@@ -160,6 +160,7 @@ class Flight {
   // fit the camera.
   void prepare(SourceFrame& frame);
   void start(const SourceFrame& frame);
+  void add_turn(const SourceFrame& frame);
   void track_frame(SourceFrame frame);
   // The status of a frame that is not given to the tracker.
   int32_t lost_status() const;
@@ -197,7 +198,12 @@ class Flight {
   std::map<int, Thumbnail> thumbnails_;  // by the number of the frame that was given
   // The colours of the keypoints of the frames that were given and became keyframes.
   std::map<int, std::vector<Rgb>> colours_;
-  bool gap_ = false;  // a frame was left out before the next one
+  struct Turn {
+    Matrix3 previous_from_cam{1, 0, 0, 0, 1, 0, 0, 0, 1};
+    double sigma_rad = 0;
+  };
+  std::optional<Turn> turn_;  // since the frame that was given before; empty: not known
+  bool gap_ = false;          // a frame was left out before the next one
   RepeatedPictures repeated_;
   TwoEyes eyes_;
   CombedRows combed_rows_;

@@ -35,6 +35,9 @@ struct SourceFrame {
   double height_sigma_m = 0;
   std::optional<Vector3> velocity_m_s;  // along the axes of the camera
   double velocity_sigma_m_s = 0;
+  // The turn since the frame that the source gave before.
+  std::optional<Matrix3> previous_from_cam;
+  double turn_sigma_rad = 0;
 };
 
 class FrameSource {

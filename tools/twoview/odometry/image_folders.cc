@@ -64,6 +64,7 @@ class ImageFolder : public FrameSource {
 
   int turn_deg() const override { return is_turned_ ? 0 : turn_deg_; }
   void run(const Wanted& wanted, const Consumer& consume, const std::atomic<bool>& stop) override {
+    std::optional<double> before_s;
     for (size_t k = 0; k < folder_.frames.size() && !stop; ++k) {
       const Listed& listed = folder_.frames[k];
       SourceFrame frame;
@@ -87,6 +88,8 @@ class ImageFolder : public FrameSource {
         frame.problem = e.what();
       }
       if (folder_.measurements) folder_.measurements->add_to(frame);
+      if (folder_.measurements && before_s) folder_.measurements->add_turn(*before_s, frame);
+      before_s = frame.time_s;
       if (!consume(frame)) return;
     }
   }

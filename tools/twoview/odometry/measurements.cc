@@ -17,6 +17,8 @@ constexpr double kGapS = 0.25;   // longest time between two samples that are in
 constexpr double kSameS = 1e-6;  // a sample at the time of the frame, as times are written
 constexpr size_t kNumbers = 12;  // a sample
 // What no drone has, as in the drivers: such a number is no measurement.
+constexpr int kMostRateRadS = 100;
+constexpr double kGyroGapS = 0.1;  // longest time between two samples of a gyro
 constexpr double kMostHeightM = 3000, kMostSpeedMS = 150;
 
 // The numbers of words[first..], in which "nan" means "not measured".
@@ -97,6 +99,23 @@ Measurements::Sample Measurements::sample_of(const std::vector<double>& n,
   return sample;
 }
 
+void Measurements::add_gyro(const std::vector<double>& n, const std::string& where) {
+  if (n.size() != 5)
+    throw BadInput(where + " has " + std::to_string(n.size()) +
+                   " numbers after gyro, not 5: a time, three rates and their sigma");
+  if (std::isnan(n[0])) throw BadInput(where + " has no time");
+  if (n[4] < 0) throw BadInput(where + " has a negative standard deviation");
+  if (!is_known(n, 1, 4) || n[4] == 0) return;
+  if (std::hypot(n[1], n[2], n[3]) > kMostRateRadS)
+    throw BadInput(where + " has a rate above " + std::to_string(kMostRateRadS) +
+                   " rad/s: are its rates in degrees?");
+  if (!gyro_.empty() && !(n[0] > gyro_.back().time_s))
+    throw BadInput(where + ": its time is not later than that of the gyro line before");
+  const Vector3 rate = applied(transposed(body_from_camera_), {n[1], n[2], n[3]});
+  gyro_.push_back({n[0], {rate[0], rate[1], rate[2]}});
+  gyro_sigma_rad_s_ = std::max(gyro_sigma_rad_s_, n[4]);
+}
+
 bool Measurements::are_metres() const {
   return 2 * heights_.impossible <= heights_.measured &&
          2 * velocities_.impossible <= velocities_.measured;
@@ -117,6 +136,10 @@ Measurements Measurements::read(const std::string& file) {
         throw BadInput(where + " is not body_from_cam and a quaternion w x y z");
       found.body_from_camera_ = rotation_of_quaternion(q[1], q[2], q[3], q[0]);
       has_mount = true;
+      continue;
+    }
+    if (words[0] == "gyro") {
+      found.add_gyro(numbers_of(words, 1, where), where);
       continue;
     }
     const Sample sample = found.sample_of(numbers_of(words, 0, where), where);
@@ -173,6 +196,23 @@ std::array<const Measurements::Sample*, 2> Measurements::around(double time_s) c
   }
   if (b->time_s - a->time_s > kGapS) return {};
   return {&*a, &*b};
+}
+
+void Measurements::add_turn(double before_s, SourceFrame& frame) const {
+  const auto is_before = [](const tv_gyro_sample& s, double time) { return s.time_s < time; };
+  const auto last = std::lower_bound(gyro_.begin(), gyro_.end(), frame.time_s, is_before);
+  auto first = std::lower_bound(gyro_.begin(), last, before_s, is_before);
+  if (last == gyro_.end() || first == gyro_.begin()) return;
+  --first;
+  for (auto k = first; k != last; ++k)
+    if (std::next(k)->time_s - k->time_s > kGyroGapS) return;
+  Matrix3 turn;
+  double sigma = 0;
+  if (tv_integrate_gyro(&*first, static_cast<int32_t>(last - first) + 1, gyro_sigma_rad_s_,
+                        before_s, frame.time_s, turn.data(), &sigma) != TV_OK)
+    return;
+  frame.previous_from_cam = turn;
+  frame.turn_sigma_rad = sigma;
 }
 
 void Measurements::add_to(SourceFrame& frame) const {

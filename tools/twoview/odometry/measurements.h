@@ -1,5 +1,6 @@
 // What a vehicle measured beside its pictures, as the file imu.txt of a set folder has it
-// (docs/formats.md): attitudes, heights and velocities with their standard deviations.
+// (docs/formats.md): attitudes, heights, velocities and rates of turn with their standard
+// deviations.
 #pragma once
 
 #include <string>
@@ -22,6 +23,10 @@ class Measurements {
   // add nothing.
   void add_to(SourceFrame& frame) const;
 
+  // Adds the turn since the frame before, of the time before_s, where the gyro's samples reach from
+  // one to the other.
+  void add_turn(double before_s, SourceFrame& frame) const;
+
   // What is to be said of the file, for frames of these times (rising); empty where nothing is.
   std::string note(const std::vector<double>& frame_times_s) const;
 
@@ -41,10 +46,13 @@ class Measurements {
   std::string note_on_clock(const std::vector<double>& frame_times_s) const;
   std::string note_on_units() const;
   Sample sample_of(const std::vector<double>& numbers, const std::string& where);
+  void add_gyro(const std::vector<double>& numbers, const std::string& where);
   bool are_metres() const;
 
   Matrix3 body_from_camera_{};
-  std::vector<Sample> samples_;  // sorted by time
+  std::vector<Sample> samples_;       // sorted by time
+  std::vector<tv_gyro_sample> gyro_;  // on the camera's axes, sorted by time
+  double gyro_sigma_rad_s_ = 0;       // the largest one that was given
   std::string file_;
   // Of a quantity, how many were measured, and how many of these no drone has.
   struct Count {

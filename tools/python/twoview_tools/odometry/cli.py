@@ -8,8 +8,8 @@ import shutil
 import sys
 import tempfile
 
-from . import (copies, endurance, evaluate, faults, flights, instructions, mapper, no_camera,
-               orbslam, poses, runs, sensors, sets, tables, targets, tour)
+from . import (copies, endurance, evaluate, faults, flights, gyro, instructions, mapper,
+               no_camera, orbslam, poses, runs, sensors, sets, tables, targets, tour)
 
 # The sources that faults are put into: one real and quick, one rendered; and what other_room shows.
 FAULT_SET, OTHER_SET = "seq_tsukuba", "seq_icl_of_kt3"
@@ -34,6 +34,9 @@ def arguments_of(argv):
     parser.add_argument("--sensors", type=int, default=0, metavar="N",
                         help="the flights of the seeds 0 to N-1 with heights or velocities of "
                              f"another unit, sign or time: {', '.join(sensors.KINDS)}")
+    parser.add_argument("--gyro", type=int, default=0, metavar="N",
+                        help="the flights of the seeds 0 to N-1 with darkness and fast turns, "
+                             f"without and with a gyro: {', '.join(gyro.KINDS)}")
     parser.add_argument("--peers", action="store_true", help="ORB-SLAM3 over the same sources")
     parser.add_argument("--json", metavar="FILE", help="write every figure")
     parser.add_argument("--program", help="the program twoview (default: the release build's)")
@@ -87,6 +90,13 @@ def sources_of(arguments, scratch):
             label = f"{name}+{kind}"
             yield "sensors", label, sensors.make(kind, flight,
                                                  os.path.join(scratch, "sensors", label))
+    for seed in range(arguments.gyro):
+        flight = flights.flight(seed)
+        for kind in gyro.KINDS:
+            for with_gyro in (False, True):
+                label = f"flight_{seed:02d}+{kind}" + ("+gyro" if with_gyro else "")
+                yield "fault", label, gyro.make(kind, flight, os.path.join(scratch, "gyro", label),
+                                                seed, with_gyro)
     if not (arguments.faults or arguments.fault_sources):
         return
     chosen = sets.set_paths(arguments.fault_sources or FAULT_SET)
