@@ -247,3 +247,13 @@ def test_locate_leaves_the_map_as_it_is(frames, flight):
     data = odometry.save()
     assert odometry.locate(frames[15]).status == tv.OdometryStatus.TRACKING
     assert odometry.save() == data
+
+
+def test_a_gyro_at_a_constant_rate_turns_by_rate_times_time():
+    R, sigma = tv.integrate_gyro([0, 0.05, 0.1], [[0, 2, 0]] * 3, 0.01, 0, 0.1)
+    angle = 0.2
+    expected = [[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]]
+    np.testing.assert_allclose(R, expected, atol=1e-14)
+    assert sigma == pytest.approx(0.01 * np.sqrt(2 * 0.025**2 + 0.05**2))
+    with pytest.raises(ValueError, match="rates_rad_s"):
+        tv.integrate_gyro([0, 1], [[0, 2, 0]] * 3, 0.01, 0, 0.1)

@@ -40,7 +40,7 @@ from .depth_map import DepthMap, sweep_depth
 from .enums import (CameraModel, Kernels, Kind, Loss, MapReason, Normalisation, OdometryStatus,
                     Orientation, PathOrigin, PointStatus, Purpose, Reason, Refine, RoomPlaneKind,
                     ScaleSource, Solver, Stage, Status, Triangulation, Verdict)
-from .odometry import Keyframe, Odometry, OdometryState
+from .odometry import Keyframe, Odometry, OdometryState, integrate_gyro
 from .options import (AbsolutePoseOptions, BundleOptions, DenseOptions, DepthOptions,
                       EstimateOptions, FeatureOptions, GuidedOptions, MatchOptions, OdometryOptions,
                       RoomInferOptions, RoomMeshOptions,
@@ -97,7 +97,7 @@ __all__ = [
     "camera_undistort", "camera_unproject_points", "camera_valid_angle", "correct_matches",
     "corrected_camera", "default_library", "densify", "describe", "detect",
     "estimate_absolute_pose", "estimate_two_view", "extract", "format_cameras",
-    "keypoint_shapes", "keypoint_sigmas", "match", "match_guided", "orient", "parse_cameras",
-    "point_covariances",
+    "integrate_gyro", "keypoint_shapes", "keypoint_sigmas", "match", "match_guided", "orient",
+    "parse_cameras", "point_covariances",
     "read_calibration", "read_camera", "read_cameras", "reconstruct", "sweep_depth", "triangulate",
     "version_string", "write_cameras"]

@@ -247,6 +247,10 @@ class tv_odometry_options(Structure):
                 ("seed", c_uint64), ("refine", c_uint32), ("reserved", c_int32)]
 
 
+class tv_gyro_sample(Structure):
+    _fields_ = [("time_s", c_double), ("rate_rad_s", c_double * 3)]
+
+
 class tv_odometry_frame(Structure):
     _fields_ = [("struct_size", c_uint32), ("gap", c_int32), ("image", tv_image),
                 ("time_s", c_double), ("world_from_cam", c_double * 9),
@@ -391,11 +395,11 @@ STRUCTS = [tv_limits, tv_image, tv_camera, tv_calibration, tv_camera_pair, tv_ep
            tv_pixel_points, tv_absolute_pose_options, tv_absolute_pose, tv_window_view,
            tv_observation, tv_pose_prior, tv_gravity_prior, tv_distance_prior, tv_window,
            tv_window_options, tv_window_result, tv_odometry_options, tv_odometry_frame,
-           tv_odometry_state, tv_keyframe, tv_path_frame, tv_path_pose, tv_map_point,
-           tv_map_observation, tv_dense_options, tv_dense_point, tv_depth_options, tv_depth_view,
-           tv_depth_arrays, tv_room_options, tv_depth_map, tv_room_state, tv_room_vertex,
-           tv_room_triangle, tv_room_mesh_options, tv_room_plane, tv_room_plane_options,
-           tv_room_infer_options]
+           tv_gyro_sample, tv_odometry_state, tv_keyframe, tv_path_frame, tv_path_pose,
+           tv_map_point, tv_map_observation, tv_dense_options, tv_dense_point, tv_depth_options,
+           tv_depth_view, tv_depth_arrays, tv_room_options, tv_depth_map, tv_room_state,
+           tv_room_vertex, tv_room_triangle, tv_room_mesh_options, tv_room_plane,
+           tv_room_plane_options, tv_room_infer_options]
 
 KEYPOINT = np.dtype(tv_keypoint)
 CORRESPONDENCE = np.dtype(tv_correspondence)

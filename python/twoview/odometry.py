@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from ctypes import byref, c_int32, c_size_t, c_void_p
+from ctypes import byref, c_double, c_int32, c_size_t, c_void_p
 from dataclasses import dataclass, replace
 from typing import Any, Optional
 
@@ -13,6 +13,23 @@ from . import _abi
 from .camera import Camera, camera_struct
 from .enums import MapReason, OdometryStatus, Reason, ScaleSource
 from .options import OdometryOptions, to_struct
+
+
+def integrate_gyro(times_s: Any, rates_rad_s: Any, sigma_rad_s: float, begin_s: float,
+                   end_s: float) -> tuple[np.ndarray, float]:
+    """tv_integrate_gyro: a gyro's rates to the turn of the camera from begin_s to end_s. Returns
+    (previous_from_cam, turn_sigma_rad), which Odometry.track takes. Raises ValueError for samples
+    that do not reach from begin_s to end_s, or are of another shape.
+    times_s: (n,), rising. rates_rad_s: (n, 3), about the camera's axes. sigma_rad_s: the standard
+    deviation of the noise of each rate."""
+    times = np.asarray(times_s, np.float64).reshape(-1)
+    rates = _abi.small_array("rates_rad_s", rates_rad_s, len(times), 3)
+    samples = np.ascontiguousarray(np.column_stack([times, rates]))
+    R, sigma = (c_double * 9)(), c_double()
+    _abi.default_library().call("tv_integrate_gyro", c_void_p(samples.ctypes.data),
+                                c_int32(len(times)), c_double(sigma_rad_s), c_double(begin_s),
+                                c_double(end_s), R, byref(sigma))
+    return np.array(R).reshape(3, 3), sigma.value
 
 
 @dataclass(frozen=True)
@@ -129,7 +146,8 @@ class Odometry:
         anew. world_from_cam: (3, 3), the vehicle's
         attitude in a world whose z axis points down. Measurements with a sigma of 0 do not
         exist. mask: None, or uint8 or bool of the image's shape, 0 where the picture is left
-        out. previous_from_cam: (3, 3), the turn since the frame before as a gyro measured it."""
+        out. previous_from_cam: (3, 3), the turn since the frame before as a gyro measured it
+        (integrate_gyro)."""
         frame = self.library.make(_abi.tv_odometry_frame, {
             "gap": int(gap), "time_s": time_s, "attitude_sigma_rad": attitude_sigma_rad,
             "height_m": height_m, "height_sigma_m": height_sigma_m, "velocity_m_s": velocity_m_s,
