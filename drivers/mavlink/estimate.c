@@ -17,6 +17,19 @@ static const double ACCELERATION = 5.0;
    the noise of such a position. */
 static const double HALF_QUALITY_M = 0.1;
 enum { WEAK_QUALITY = 20 };
+/* By how much a segment that begins in flight drifts more than the first one, from fewer attitudes:
+   the root mean square of its turn was 0.0077 rad in 19 rendered segments, for 0.0030 of the first
+   ones. */
+static const double LATER_DRIFT = 2.0;
+/* How long a map whose vertical was not the vehicle's must agree with it before it is believed. */
+static const double DOUBT_S = 1.0;
+/* The way of the pictures is compared with that of the vehicle's own velocities over a time that
+   fades: chi square of three degrees of freedom, 99.9 %. A segment that is new, or was found again,
+   is believed after as long as this has been possible for TRIAL_S. For longer than MOST_REFUSED_S
+   the vehicle's own velocity may be what is wrong, since it gets no estimates. */
+static const double COMPARED_S = 0.4, TRIAL_S = 0.2, MOST_REFUSED_S = 2.0, CONTRADICTED = 16.27;
+/* The least noise of a velocity that PX4 (EKF2_EVV_NOISE) and ArduPilot (VISO_VEL_M_NSE) take. */
+static const double LEAST_VELOCITY_NOISE = 0.1;
 /* A correction of a pose without a covariance that counts as a reset: metres, radians. */
 static const double LEAST_JUMP_M = 0.05, LEAST_JUMP_RAD = 0.01;
 /* The cosine of the pitch below which roll and yaw cannot be told apart. */
@@ -184,9 +197,21 @@ static tvm_silence silence_of(const tvm_estimator *e, const tvm_track *track) {
   if (s->status == TV_ODOMETRY_ROTATION) return TVM_SILENCE_ROTATION;
   if (s->status == TV_ODOMETRY_LOST || !s->has_pose || !is_usable(s)) return TVM_SILENCE_LOST;
   if (s->scale_source == TV_SCALE_UNIT) return TVM_SILENCE_SCALE;
-  if (!track->is_upright) return TVM_SILENCE_ATTITUDE;
+  if (track->is_upright != 1 || e->doubt_ms > 0) return TVM_SILENCE_ATTITUDE;
   if (s->status == TV_ODOMETRY_WEAK && e->options.weak == TVM_WEAK_SILENT) return TVM_SILENCE_WEAK;
   return TVM_SILENCE_NONE;
+}
+
+/* A map that was turned once, such as one of another place, may be upright by chance in the next
+   frame. */
+static void count_doubt(tvm_estimator *e, const tvm_track *track) {
+  const double step_ms = (double)(track->host_ns - e->last_ns) * 1e-6;
+  if (track->state->has_pose && track->state->segment != e->last_segment) e->doubt_ms = 0;
+  if (track->is_upright < 0) {
+    e->doubt_ms = (int32_t)(1e3 * DOUBT_S);
+  } else if (track->is_upright) {
+    e->doubt_ms = step_ms < e->doubt_ms ? e->doubt_ms - (int32_t)step_ms : 0;
+  }
 }
 
 /* Whether previous_R and previous_t hold a pose. */
@@ -218,11 +243,13 @@ static void count_resets(tvm_estimator *e, const tvm_track *track) {
   if (jumps || was_corrected(e, track)) e->reset_counter = (e->reset_counter + 1) & 255;
   /* The way since the last frame is then not one of the vehicle. */
   if (jumps) e->has_last = 0;
+  if (e->last_segment >= 0 && (s->relocated || s->segment != e->last_segment)) e->is_on_trial = 1;
   /* A loop that joins a segment to an older one leads to what all the way since has drifted. */
   if (s->segment < e->last_segment) {
     e->path_m = e->way_m;
   } else if (s->segment > e->last_segment || is_metric != e->was_metric) {
-    e->path_m = 0;
+    /* Before the metre is known the way is not, but it is no shorter than this. */
+    e->path_m = is_metric ? sqrt(length_sq(s->world_from_cam_t)) : 0;
   }
   e->last_segment = s->segment;
   e->was_metric = is_metric;
@@ -300,29 +327,49 @@ static double messages_in_memory(const tvm_estimator *e, const tvm_track *track)
   return dt < e->options.filter_memory_s ? e->options.filter_memory_s / dt : 1;
 }
 
-/* What stays the same from message to message, `times` times: a metre that errs moves all places
-   away from the map's origin together, and the map drifts. */
-static void add_common(const tvm_estimator *e, double scale_sigma, const double *p, double times,
+/* The standard deviation of the map's turn about each axis, radians. */
+static double turn_of(const tvm_estimator *e, int32_t segment) {
+  return e->options.drift_turn_rad * (segment > 0 ? LATER_DRIFT : 1);
+}
+
+/* That of the map's drift along each axis, metres. */
+static double drift_of(const tvm_estimator *e, int32_t segment) {
+  return e->options.drift_share * e->path_m * (segment > 0 ? LATER_DRIFT : 1);
+}
+
+/* What stays the same from message to message: a metre that errs moves all places
+   away from the map's origin together, the map drifts, and it is turned about its origin, which
+   moves a place at p by the turn x p. */
+static void add_common(const tvm_estimator *e, const tv_odometry_state *s, const double *p,
                        double *covariance) {
-  const double place = e->options.drift_share * e->path_m, turn = e->options.drift_turn_rad;
-  int k;
-  add_scale(scale_sigma * sqrt(times), p, covariance);
+  const double place = drift_of(e, s->segment), turn = turn_of(e, s->segment);
+  const double turn_sq = turn * turn;
+  double p_cross[9];
+  int i, k;
+  add_scale(s->scale_sigma, p, covariance);
+  cross_matrix(p, p_cross);
   for (k = 0; k < 3; ++k) {
-    covariance[7 * k] += times * place * place;
-    covariance[7 * (k + 3)] += times * turn * turn;
+    covariance[7 * k] += place * place + turn_sq * length_sq(p);
+    covariance[7 * (k + 3)] += turn_sq;
+    for (i = 0; i < 3; ++i) {
+      covariance[6 * i + k] -= turn_sq * p[i] * p[k];
+      covariance[6 * i + 3 + k] -= turn_sq * p_cross[3 * i + k];
+      covariance[6 * (3 + k) + i] -= turn_sq * p_cross[3 * i + k];
+    }
   }
 }
 
 /* Velocity and rate by the difference to the last pose; `now` and `last` are the covariances of the
    body's place and turn. Their change since the last difference is what the acceleration may have
-   changed within half of the step. */
+   changed within half of the step. By how much the way differs from the vehicle's own stays the
+   same from message to message: its variance counts as often as there were messages. */
 static void add_velocity(tvm_estimator *e, const tvm_track *track, const double *R, const double *p,
                          const double *now, const double *last_R, const double *last_p,
                          const double *last, tvm_estimate *out) {
   const double dt = (double)(track->host_ns - e->last_ns) * 1e-9;
   double body_from_world[9], last_from_world[9], turn[9], v[3], w[3], rate[3], cross[9], by_turn[9];
   double J[36] = {0}, sum[36], shares[36];
-  double change_v = ACCELERATION * ACCELERATION * dt * dt, change_w = change_v;
+  double change_v = ACCELERATION * ACCELERATION * dt * dt, change_w = change_v, difference = 0;
   int k;
   for (k = 0; k < 3; ++k) v[k] = (p[k] - last_p[k]) / dt;
   transpose(R, body_from_world);
@@ -355,14 +402,45 @@ static void add_velocity(tvm_estimator *e, const tvm_track *track, const double 
     for (k = 0; k < 36; ++k) out->velocity_covariance[k] += shares[k];
     add_scale(track->state->scale_sigma * sqrt(messages_in_memory(e, track)), out->velocity_m_s,
               out->velocity_covariance);
+    if (e->compared_s > 0) difference = length_sq(e->compared_gap) / (e->compared_s * dt);
     for (k = 0; k < 3; ++k) {
-      out->velocity_covariance[7 * k] += change_v / 4;
+      out->velocity_covariance[7 * k] += change_v / 4 + difference;
       out->velocity_covariance[7 * (k + 3)] += change_w / 4;
     }
   }
   memcpy(e->last_velocity, v, sizeof v);
   memcpy(e->last_rate, rate, sizeof rate);
   e->has_velocity = 1;
+}
+
+/* Whether the way of the pictures contradicts the vehicle's own velocities, or a map on trial has
+   not been compared with them for long enough. */
+static int is_contradicted(tvm_estimator *e, const tvm_track *track) {
+  const tv_odometry_state *s = track->state;
+  const double *C = s->cam_from_world_covariance, sigma = track->velocity_sigma_m_s;
+  const double dt = (double)(track->host_ns - e->last_ns) * 1e-9;
+  const double turn = turn_of(e, s->segment);
+  const double share = turn * turn + s->scale_sigma * s->scale_sigma;
+  double R[9], p[3], last_R[9], last_p[3], by_vehicle[3], variance, fade;
+  int k;
+  if (!(sigma > 0)) return 0;
+  body_pose(e, s->world_from_cam_R, s->world_from_cam_t, R, p);
+  body_pose(e, has_previous(track) ? track->previous_R : e->last_R,
+            has_previous(track) ? track->previous_t : e->last_t, last_R, last_p);
+  apply(R, track->velocity_m_s, by_vehicle);
+  e->compared_s += dt;
+  fade = e->compared_s > COMPARED_S ? COMPARED_S / e->compared_s : 1;
+  e->compared_s *= fade;
+  for (k = 0; k < 3; ++k) {
+    e->compared_way[k] = fade * (e->compared_way[k] + p[k] - last_p[k]);
+    e->compared_gap[k] = fade * (e->compared_gap[k] + p[k] - last_p[k] - dt * by_vehicle[k]);
+  }
+  variance = sigma * sigma * e->compared_s * e->compared_s + share * length_sq(e->compared_way);
+  if (s->has_covariance) variance += 2 * (C[21] + C[28] + C[35]) / 3;
+  if (e->is_on_trial && e->compared_s < TRIAL_S) return 1;
+  e->is_on_trial = 0;
+  e->refused_s = length_sq(e->compared_gap) > CONTRADICTED * variance ? e->refused_s + dt : 0;
+  return e->refused_s > 0 && e->refused_s < MOST_REFUSED_S;
 }
 
 /* The way since the last frame, by the map as it is now. */
@@ -375,14 +453,21 @@ static void add_way(tvm_estimator *e, const tvm_track *track) {
   e->way_m += sqrt(length_sq(step));
 }
 
+/* Before the first frame of a stretch without a jump. */
+static void begin_stretch(tvm_estimator *e) {
+  e->has_velocity = 0;
+  e->compared_s = e->refused_s = 0;
+  memset(e->compared_way, 0, sizeof e->compared_way);
+  memset(e->compared_gap, 0, sizeof e->compared_gap);
+}
+
 static void keep_pose(tvm_estimator *e, const tvm_track *track) {
   const tv_odometry_state *s = track->state;
-  const tvm_estimator_options *o = &e->options;
   const double *C = s->cam_from_world_covariance, *t = s->world_from_cam_t;
-  e->last_place_sq = 3 * o->drift_share * o->drift_share * e->path_m * e->path_m +
+  e->last_place_sq = 3 * drift_of(e, s->segment) * drift_of(e, s->segment) +
                      s->scale_sigma * s->scale_sigma * length_sq(t) +
                      (s->has_covariance ? C[21] + C[28] + C[35] : LEAST_JUMP_M * LEAST_JUMP_M);
-  e->last_turn_sq = 3 * o->drift_turn_rad * o->drift_turn_rad +
+  e->last_turn_sq = 3 * turn_of(e, s->segment) * turn_of(e, s->segment) +
                     (s->has_covariance ? C[0] + C[7] + C[14] : LEAST_JUMP_RAD * LEAST_JUMP_RAD);
   memcpy(e->last_R, s->world_from_cam_R, sizeof e->last_R);
   memcpy(e->last_t, s->world_from_cam_t, sizeof e->last_t);
@@ -391,11 +476,27 @@ static void keep_pose(tvm_estimator *e, const tvm_track *track) {
   e->has_last = 1;
 }
 
+/* How often the filter counts `common`, the covariance of what stays. Between two messages it adds
+   the velocity's variance times the squared step to its position's, and it averages positions until
+   that sum is what it believes of the average; the position is then known to no more than what
+   stays if the average is of as many messages as the sum needs to reach that. */
+static double messages_averaged(const tvm_estimator *e, const tvm_track *track,
+                                const double *common, const double *velocity) {
+  const double dt = (double)(track->host_ns - e->last_ns) * 1e-9;
+  const double place = fmax(fmax(common[0], common[7]), common[14]);
+  const double speed = fmax((velocity[0] + velocity[7] + velocity[14]) / 3,
+                            LEAST_VELOCITY_NOISE * LEAST_VELOCITY_NOISE);
+  const double times = messages_in_memory(e, track);
+  if (e->options.filter_memory_s == 0 || !(e->options.messages & TVM_SEND_ODOMETRY)) return times;
+  return fmax(times, place / (speed * dt * dt));
+}
+
 /* The estimate of a frame with a pose in metres, upright. */
 static void estimate_of(tvm_estimator *e, const tvm_track *track, tvm_estimate *out) {
   const tv_odometry_state *s = track->state;
   const int is_weak = s->status == TV_ODOMETRY_WEAK;
   double R[9], p[3], last_R[9], last_p[3], now[36] = {0}, last[36] = {0};
+  double common[36] = {0}, single[36], place_times, turn_times;
   int k, quality;
   body_pose(e, s->world_from_cam_R, s->world_from_cam_t, R, p);
   body_pose(e, has_previous(track) ? track->previous_R : e->last_R,
@@ -406,9 +507,16 @@ static void estimate_of(tvm_estimator *e, const tvm_track *track, tvm_estimate *
     body_covariance(e, e->last_R, last_R, e->last_covariance, last);
   }
   add_velocity(e, track, R, p, now, last_R, last_p, last, out);
-  add_common(e, s->scale_sigma, p, 1, now);
-  quality = quality_of(now, is_weak);
-  add_common(e, s->scale_sigma, p, messages_in_memory(e, track) - 1, now);
+  add_common(e, s, p, common);
+  turn_times = messages_in_memory(e, track);
+  place_times = messages_averaged(e, track, common, out->velocity_covariance);
+  for (k = 0; k < 36; ++k) {
+    const double row = k < 18 ? place_times : turn_times;
+    const double column = k % 6 < 3 ? place_times : turn_times;
+    single[k] = now[k] + common[k];
+    now[k] += sqrt(row * column) * common[k];
+  }
+  quality = quality_of(single, is_weak);
   if (e->options.world == TVM_WORLD_NED) {
     const double c = cos(track->heading_rad), n = sin(track->heading_rad);
     const double about_z[9] = {c, -n, 0, n, c, 0, 0, 0, 1};
@@ -468,13 +576,18 @@ tvs_status tvm_estimator_update(tvm_estimator *e, const tvm_track *given, tvm_es
   }
   if (track->host_ns <= e->last_ns) return TVS_ERR_ARGUMENT;
   memset(estimate, 0, sizeof *estimate);
+  count_doubt(e, track);
   if (track->state->has_pose) count_resets(e, track);
   silence = silence_of(e, track);
   if (silence == TVM_SILENCE_NONE || silence == TVM_SILENCE_WEAK) {
     if (e->has_last && track->host_ns - e->last_ns > MOST_STEP_NS) e->has_last = 0;
-    if (!e->has_last) e->has_velocity = 0;
-    if (e->has_last) add_way(e, track);
-    if (!e->has_last && silence == TVM_SILENCE_NONE) silence = TVM_SILENCE_VELOCITY;
+    if (!e->has_last) begin_stretch(e);
+    if (e->has_last) {
+      add_way(e, track);
+      if (is_contradicted(e, track) && silence == TVM_SILENCE_NONE) silence = TVM_SILENCE_MOTION;
+    } else if (silence == TVM_SILENCE_NONE) {
+      silence = TVM_SILENCE_VELOCITY;
+    }
     if (silence == TVM_SILENCE_NONE) estimate_of(e, track, estimate);
     keep_pose(e, track);
   } else {

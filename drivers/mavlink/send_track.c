@@ -106,6 +106,7 @@ static const char *words_of(int silence) {
     case TVM_SILENCE_LOST: return "twoview: lost, no position";
     case TVM_SILENCE_ROTATION: return "twoview: only turning is seen, no position";
     case TVM_SILENCE_WEAK: return "twoview: weak, no position";
+    case TVM_SILENCE_MOTION: return "twoview: not as the vehicle moves, no position";
     case TVM_SILENCE_SCALE: return "twoview: metre not known, no position";
     default: return "twoview: vertical not known, no position";
   }
@@ -182,7 +183,9 @@ tvs_status tvm_session_send_track(tvm_session *session, tvm_estimator *estimator
   if (tvm_session_attitude_at(session, tracked->host_ns, &time, &attitude) == TVS_OK &&
       time.device_ns > 0) {
     known.time_us = (uint64_t)time.device_ns / 1000;
-    known.is_upright = tracked->state->has_pose && is_upright(estimator, tracked->state, &attitude);
+    if (tracked->state->has_pose) {
+      known.is_upright = is_upright(estimator, tracked->state, &attitude) ? 1 : -1;
+    }
     known.heading_rad = session->yaw0_rad;
   }
   if (!has_heading(session, estimator, tracked->state) &&

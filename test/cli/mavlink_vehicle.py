@@ -80,14 +80,16 @@ class Vehicle(threading.Thread):
     """Sends HEARTBEAT to a port of this computer; from the first packet of the companion on it
     flies and sends what was requested. `faults`: of every 25 packets one each is lost, repeated,
     corrupted, and sent after the next one; `num_faults` counts them. A second vehicle with other
-    attitudes sends to the same port, and so does something that is no vehicle (`num_garbage`)."""
+    attitudes sends to the same port, and so does something that is no vehicle (`num_garbage`). A
+    second port may get the packets of both sides, as a router passes them on (`routed_to`)."""
 
     FAULTS = {5: "lost", 10: "repeated", 15: "corrupted", 20: "late"}
 
     def __init__(self, mavlink, port, autopilot="px4", faults=False, version=2, system=7,
-                 attitudes=True, lives=60.0):
+                 attitudes=True, lives=60.0, routed_to=None):
         super().__init__(daemon=True)
         self.mavlink, self.port, self.faults, self.attitudes = mavlink, port, faults, attitudes
+        self.routed_to = routed_to
         self.autopilot = (mavlink.MAV_AUTOPILOT_PX4 if autopilot == "px4"
                           else mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA)
         self.link = mavlink.MAVLink(None, srcSystem=system, srcComponent=1)
@@ -133,6 +135,11 @@ class Vehicle(threading.Thread):
                 packets, self.held = [data, self.held], None
         for packet in packets:
             self.socket.sendto(packet, ("127.0.0.1", self.port))
+            self.route(packet)
+
+    def route(self, packet):
+        if self.routed_to:
+            self.socket.sendto(packet, ("127.0.0.1", self.routed_to))
 
     def listen(self):
         while select.select([self.socket], [], [], 0)[0]:
@@ -140,6 +147,7 @@ class Vehicle(threading.Thread):
                 data = self.socket.recv(2048)
             except ConnectionRefusedError:
                 continue
+            self.route(data)
             for m in self.link.parse_buffer(data) or []:
                 self.heard.append(m)
                 if m.get_type() == "BAD_DATA":

@@ -4,11 +4,13 @@ import csv
 import json
 import math
 import os
+import re
 import shutil
 import socket
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 from pathlib import Path
 
@@ -24,6 +26,13 @@ try:
 except ImportError as error:
     print(f"skipped: {error} (scripts/bootstrap test)")
     sys.exit(SKIP_CODE)
+
+try:
+    import mavsdk
+    from mavsdk.plugins.mavlink_direct import MavlinkDirect
+    from mavsdk.plugins.telemetry import Telemetry
+except ImportError:
+    mavsdk = None
 
 PROGRAM = os.environ["TWOVIEW_PROGRAM"]
 
@@ -307,6 +316,11 @@ class Mavlink(unittest.TestCase):
         self.assertLessEqual(len(odometry), len(known))
         self.assertGreater(len(odometry), 0.8 * len(known))
         self.assertIn(f"{len(odometry)} frames were sent to the vehicle", result.stdout)
+        # The message waits for nothing but the tracker; its report is written afterwards.
+        took = re.search(r"to message ([\d.]+) ms \(mean\), ([\d.]+) ms \(max\)", result.stdout)
+        tracker = json.loads((output / "result.json").read_text())["time_ms"]
+        self.assertLess(float(took[1]), tracker["mean"] + 1)
+        self.assertLess(float(took[2]), tracker["max"] + 1)
         self.assertEqual(len(positions), len(odometry))
         numbers = [m.get_seq() for messages in heard.values() for m in messages]
         self.assertEqual(len(set(numbers)), min(256, len(numbers)))
@@ -350,6 +364,41 @@ class Mavlink(unittest.TestCase):
         texts = [m.text for m in heard["STATUSTEXT"]]
         self.assertTrue(texts[0].startswith("twoview: ") and "no position" in texts[0], texts)
         self.assertIn("twoview: position", texts)
+
+    # Not in the bootstrap, since it brings 19 MB: scripts/python -m pip install mavsdk
+    if mavsdk:
+        @NEEDS_ODOMETRY
+        def test_mavsdk_reads_what_the_vehicle_is_told(self):
+            port, read, others = free_port(), [], []
+            ground = mavsdk.Mavsdk(mavsdk.Configuration.create_with_component_type(
+                mavsdk.ComponentType.GROUND_STATION))
+            ground.add_any_connection(f"udpin://127.0.0.1:{port}")
+            with world.Vehicle(mavlink, self.port, routed_to=port) as vehicle:
+                with subprocess.Popen([PROGRAM, "odometry", "--mavlink", self.address,
+                                       "--camera-source", self.film, "--camera", self.camera, "-o",
+                                       self.folder / "mavsdk", "--send-odometry", "--quiet"]) as process:
+                    system = ground.first_autopilot(10)
+                    telemetry, direct = Telemetry(system), MavlinkDirect(system)
+                    telemetry.subscribe_odometry(lambda message, _: read.append(message))
+                    direct.subscribe_message("ODOMETRY", lambda message, _: others.append(message))
+                    process.wait(60)
+                deadline = time.monotonic() + 5
+                sent = [m for m in vehicle.heard if m.get_type() == "ODOMETRY"]
+                while min(len(read), len(others)) < len(sent) and time.monotonic() < deadline:
+                    time.sleep(0.05)
+            ground.destroy()
+            self.assertGreater(len(sent), 20)
+            self.assertEqual([m.time_usec for m in sent], [m.time_usec for m in read])
+            for m, by_plugin, by_name in zip(sent, read, others):
+                place, q = by_plugin.position_body, by_plugin.q
+                self.assertEqual((m.x, m.y, m.z, *m.q),
+                                 (place.x_m, place.y_m, place.z_m, q.w, q.x, q.y, q.z))
+                self.assertEqual(list(m.pose_covariance), by_plugin.pose_covariance.covariance_matrix)
+                fields = json.loads(by_name.fields_json)
+                self.assertEqual((7, 197), (by_name.system_id, by_name.component_id))
+                for name in ("frame_id", "child_frame_id", "quality", "reset_counter", "vx",
+                             "estimator_type", "velocity_covariance"):
+                    self.assertEqual(getattr(m, name), fields[name], name)
 
     @NEEDS_ODOMETRY
     def test_north_and_weak_frames_are_sent_on_request(self):

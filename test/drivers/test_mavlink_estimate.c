@@ -277,6 +277,7 @@ static void test_the_map_drifts_with_the_way(void) {
 /* At 25 messages a second a filter that averages over a second counts an error that stays 25 times
    as if it were new. What is new each time stays as it is, and so does the quality. */
 static void test_what_stays_is_sent_as_often_as_the_filter_counts_it(void) {
+  double turn;
   options.drift_share = 0.005;
   options.drift_turn_rad = 0.008;
   options.filter_memory_s = 1;
@@ -286,12 +287,53 @@ static void test_what_stays_is_sent_as_often_as_the_filter_counts_it(void) {
   update();
   set_place(2, 0, 0);
   next(40);
+  turn = 0.008 * 2; /* about the origin, 2 m away */
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.02 * 0.02 + 25 * (0.01 * 0.01 + 0.02 * 0.02),
                             estimate.pose_covariance[0]);
-  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.02 * 0.02 + 25 * 0.01 * 0.01, estimate.pose_covariance[7]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.02 * 0.02 + 25 * (0.01 * 0.01 + turn * turn),
+                            estimate.pose_covariance[7]);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.001 * 0.001 + 25 * 0.008 * 0.008,
                             estimate.pose_covariance[35]);
   TEST_ASSERT_EQUAL_INT(92, estimate.quality); /* of 0.02, 0.01 and 0.02 m */
+}
+
+/* Velocities of 0.1 m/s at 25 Hz let a filter's position err by 0.02 m after a second, so that it
+   averages positions of 0.05 m for (0.05 / 0.02)^2 s. The attitude's variance is not of that time.
+ */
+static void test_a_filter_averages_for_longer_what_it_knows_less(void) {
+  options.drift_share = 0.005;
+  options.drift_turn_rad = 0.0001;
+  options.filter_memory_s = 1;
+  begin();
+  set_covariance(0, 0);
+  state.has_covariance = 1;
+  update();
+  set_place(10, 0, 0);
+  next(400);
+  next(400);
+  next(40); /* at rest, after 10 m */
+  next(40);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-3 * 0.39, 25 * 6.25 * 0.05 * 0.05, estimate.pose_covariance[0]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 25 * 1e-8, estimate.pose_covariance[35]);
+}
+
+/* The map is turned about its origin; after the first segment by twice as much. */
+static void test_a_map_that_is_turned_moves_what_is_far(void) {
+  const double variance = 0.02 * 0.02, turn = 0.01 * 3;
+  options.drift_turn_rad = 0.01;
+  begin();
+  set_covariance(0, 0.02);
+  set_place(0, 3, 0);
+  update();
+  next(40);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, variance + turn * turn, estimate.pose_covariance[0]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, variance, estimate.pose_covariance[7]);
+  /* A turn about z moves what lies along y against x. */
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, -3 * 0.01 * 0.01, estimate.pose_covariance[5]);
+  state.segment = 1;
+  next(40);
+  next(40);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, variance + 4 * turn * turn, estimate.pose_covariance[0]);
 }
 
 /* Two places of 0.02 m each over 50 ms; the velocity did not change, and the attitude is exact. */
@@ -391,6 +433,82 @@ static void test_a_number_that_is_not_finite_is_not_sent(void) {
       *places[k] = kept;
     }
   }
+}
+
+/* Another place's map is upright by chance. */
+static void test_a_map_that_was_not_upright_is_on_probation(void) {
+  begin();
+  update();
+  TEST_ASSERT_EQUAL_INT(TVM_SILENCE_NONE, next(40));
+  track.is_upright = -1;
+  TEST_ASSERT_EQUAL_INT(TVM_SILENCE_ATTITUDE, next(40));
+  track.is_upright = 1;
+  TEST_ASSERT_EQUAL_INT(TVM_SILENCE_ATTITUDE, next(500));
+  TEST_ASSERT_EQUAL_INT(TVM_SILENCE_ATTITUDE, next(490));
+  next(40);
+  TEST_ASSERT_EQUAL_INT(TVM_SILENCE_NONE, next(40));
+  track.is_upright = -1;
+  next(40);
+  track.is_upright = 1;
+  state.segment = 1; /* has done nothing wrong */
+  next(40);
+  TEST_ASSERT_EQUAL_INT(TVM_SILENCE_NONE, next(40));
+}
+
+/* The pictures move at `speed` along x for `frames` frames, the vehicle at 1 m/s. */
+static int move(double speed, int frames) {
+  for (; frames > 0; --frames) {
+    state.world_from_cam_t[0] += 0.04 * speed;
+    next(40);
+  }
+  return estimate.silence;
+}
+
+static void test_pictures_that_move_otherwise_than_the_vehicle_are_not_sent(void) {
+  begin();
+  set_covariance(0.001, 0.005);
+  track.velocity_m_s[0] = 1;
+  track.velocity_sigma_m_s = 0.05;
+  update();
+  TEST_ASSERT_EQUAL_INT(TVM_SILENCE_NONE, move(1, 10));
+  TEST_ASSERT_EQUAL_INT(TVM_SILENCE_NONE, move(1.1, 10));
+  TEST_ASSERT_EQUAL_INT(TVM_SILENCE_MOTION, move(2, 10));
+  TEST_ASSERT_EQUAL_INT(TVM_SILENCE_NONE, move(1, 40));
+  /* But not for ever: it may be the vehicle's velocity that is wrong. */
+  TEST_ASSERT_EQUAL_INT(TVM_SILENCE_MOTION, move(2, 50));
+  TEST_ASSERT_EQUAL_INT(TVM_SILENCE_NONE, move(2, 10));
+}
+
+static void test_a_later_segment_is_compared_before_it_is_sent(void) {
+  begin();
+  set_covariance(0.001, 0.005);
+  track.velocity_m_s[0] = 1;
+  track.velocity_sigma_m_s = 0.05;
+  update();
+  TEST_ASSERT_EQUAL_INT(TVM_SILENCE_NONE, move(1, 1));
+  state.segment = 1;
+  TEST_ASSERT_EQUAL_INT(TVM_SILENCE_VELOCITY, move(1, 1));
+  TEST_ASSERT_EQUAL_INT(TVM_SILENCE_MOTION, move(1, 4));
+  TEST_ASSERT_EQUAL_INT(TVM_SILENCE_NONE, move(1, 2));
+  track.velocity_sigma_m_s = 0; /* there is nothing to compare it with */
+  state.segment = 2;
+  move(3, 1);
+  TEST_ASSERT_EQUAL_INT(TVM_SILENCE_NONE, move(3, 1));
+}
+
+/* What the way differs by from the vehicle's is in the velocity's covariance. */
+static void test_a_velocity_that_differs_from_the_vehicles_is_less_sure(void) {
+  double before;
+  begin();
+  set_covariance(0, 0.02);
+  track.velocity_m_s[0] = 1;
+  track.velocity_sigma_m_s = 0.2;
+  update();
+  move(1, 10);
+  before = estimate.velocity_covariance[0];
+  move(1.3, 60);
+  TEST_ASSERT_EQUAL_INT(TVM_SILENCE_NONE, estimate.silence);
+  TEST_ASSERT_DOUBLE_WITHIN(0.05, 10 * 0.09, estimate.velocity_covariance[0] - before);
 }
 
 static void test_after_a_pause_a_velocity_is_waited_for(void) {
@@ -888,10 +1006,16 @@ int main(void) {
   RUN_TEST(test_a_metre_that_errs_grows_with_the_distance);
   RUN_TEST(test_the_map_drifts_with_the_way);
   RUN_TEST(test_what_stays_is_sent_as_often_as_the_filter_counts_it);
+  RUN_TEST(test_a_filter_averages_for_longer_what_it_knows_less);
+  RUN_TEST(test_a_map_that_is_turned_moves_what_is_far);
   RUN_TEST(test_the_velocity_errs_by_both_places_and_by_what_changed);
   RUN_TEST(test_the_quality_falls_with_the_place_and_a_weak_frame_grows);
   RUN_TEST(test_what_is_not_known_is_not_sent);
   RUN_TEST(test_a_number_that_is_not_finite_is_not_sent);
+  RUN_TEST(test_a_map_that_was_not_upright_is_on_probation);
+  RUN_TEST(test_pictures_that_move_otherwise_than_the_vehicle_are_not_sent);
+  RUN_TEST(test_a_later_segment_is_compared_before_it_is_sent);
+  RUN_TEST(test_a_velocity_that_differs_from_the_vehicles_is_less_sure);
   RUN_TEST(test_after_a_pause_a_velocity_is_waited_for);
   RUN_TEST(test_each_jump_raises_the_reset_counter_once);
   RUN_TEST(test_a_correction_counts_beyond_its_own_sigma);

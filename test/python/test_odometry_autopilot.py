@@ -2,6 +2,7 @@
 are new with each message, and errors that stay."""
 
 import os
+import tempfile
 import types
 import unittest
 
@@ -52,11 +53,28 @@ class Autopilot(unittest.TestCase):
         self.assertLess(sigmas, 3)
         self.assertLess(metres, 0.1)
 
-    def test_a_run_is_a_line_of_the_table(self):
-        rows = [(0, 1.0, 0.1, 0.0), (1, 3.5, 0.2, 0.5), (2, 9.0, 0.9, 1.5)]
-        self.assertEqual("run      3     2      1    3.50   0.200     1.50".split(),
-                         autopilot.line("run", rows).split())
-        self.assertEqual("run   no message", autopilot.line("run", []))
+    def test_a_run_is_a_row_and_a_line_of_the_table(self):
+        rows = [(0, 1.0, 0.1, 0.0), (1, 3.5, 0.2, 0.5), (2, 9.0, 0.9, 1.5), (3, 3.1, 0.1, 0.0),
+                (4, 2.0, 0.1, 0.0)]
+        row = {"flight": "f", "fault": "off", "autopilot": "PX4",
+               **autopilot.result(rows, [[0.5, 1.5]])}
+        self.assertEqual("f off PX4 5 4 2 3.50 0.200 1.50 2.50".split(),
+                         autopilot.line(row).split())
+        self.assertIn("off PX4 1 1 3.50 0.200 0 of 1".split(),
+                      [text.split() for text in autopilot.summary([row])])
+        empty = autopilot.result([], [])
+        self.assertIn("no message", autopilot.line({**row, **empty, "fed": 0}))
+
+    def test_flights_are_counted_inside_the_band_of_one_draw(self):
+        rows = [{"memory_s": None, "nees": [value, 1.0]} for value in (0.01, 0.1, 1.0, 4.0)]
+        position = autopilot.nees_lines(rows)[1].split()
+        self.assertEqual((position[0], position[-3:]), ("position", ["1", "2", "1"]))
+
+    def test_what_was_kept_is_not_tracked_again(self):
+        with tempfile.TemporaryDirectory() as folder:
+            np.savez(os.path.join(folder, "name.npz"), time=TIMES)
+            said = autopilot.kept(folder, "name", lambda: self.fail("the set was made again"))
+        np.testing.assert_array_equal(said["time"], TIMES)
 
     def test_the_driver_reads_the_structs_that_are_written_here(self):
         path = os.path.join(os.path.dirname(os.environ["TWOVIEW_LIBRARY"]),
@@ -74,8 +92,10 @@ class Autopilot(unittest.TestCase):
         found = autopilot.Message(estimator.update(state, 1.5, None, True))
         np.testing.assert_allclose(found.position, (0.5, 0, 0), atol=1e-12)
         np.testing.assert_allclose(found.velocity, (1, 0, 0), atol=1e-12)
-        drift = 2 * (0.005 * 0.5) ** 2  # two messages in the filter's second
-        np.testing.assert_allclose(np.diag(found.position_covariance), 1e-4 + drift)
+        drift = (0.005 * 0.5) ** 2 * np.ones(3)
+        drift[1:] += (0.008 * 0.5) ** 2  # by the turn about the origin
+        # Two messages in the filter's second.
+        np.testing.assert_allclose(np.diag(found.position_covariance), 1e-4 + 2 * drift)
 
     def test_a_jump_is_refused_until_the_counter_tells_of_it(self):
         kalman = autopilot.Filter("PX4")

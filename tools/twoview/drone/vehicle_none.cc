@@ -10,7 +10,9 @@ VehicleEstimates::VehicleEstimates(const EstimateOptions&, const Matrix3&, const
   throw BadInput(kNoMavlink);
 }
 
-void VehicleEstimates::send(tvm_session*, int64_t, const tv_odometry_state&,
+void VehicleEstimates::begin(int64_t, const std::optional<Vector3>&, double) {}
+
+void VehicleEstimates::send(tvm_session*, const tv_odometry_state&,
                             const std::optional<std::array<double, 12>>&) {}
 
 std::string VehicleEstimates::note() const { return {}; }

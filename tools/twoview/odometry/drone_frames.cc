@@ -220,9 +220,11 @@ class VehicleFrames : public DriverSource {
     listener.on_frame = [&](const tvs_frame& picture) {
       std::optional<SourceFrame> frame = frames.next(picture);
       if (!frame) return;
-      if (const auto at = sample_at(log, host_s(picture), kGapS))
-        add_measurements(*at, mount_, *frame);
-      exposed_ns_ = picture.time.host_ns;
+      const auto at = sample_at(log, host_s(picture), kGapS);
+      if (at) add_measurements(*at, mount_, *frame);
+      if (estimates_)
+        estimates_->begin(picture.time.host_ns, at ? at->velocity_m_s : std::nullopt,
+                          at ? at->velocity_sigma : 0);
       frames.consume(*frame);
     };
     fly_vehicle(
@@ -233,7 +235,7 @@ class VehicleFrames : public DriverSource {
   bool wants_found() const override { return estimates_.has_value(); }
   void found(const tv_odometry_state& state,
              const std::optional<std::array<double, 12>>& previous) override {
-    if (session_) estimates_->send(session_, exposed_ns_, state, previous);
+    if (session_) estimates_->send(session_, state, previous);
   }
   std::vector<std::string> notes() const override {
     std::vector<std::string> notes = DriverSource::notes();
@@ -252,7 +254,6 @@ class VehicleFrames : public DriverSource {
   bool quiet_;
   std::optional<VehicleEstimates> estimates_;
   tvm_session* session_ = nullptr;  // while it runs
-  int64_t exposed_ns_ = 0;          // when the frame that was given last was exposed
 };
 
 }  // namespace

@@ -167,9 +167,7 @@ void Flight::track(const std::atomic<bool>& stop,
                    const std::function<void(const SourceFrame&)>& after_frame) {
   const auto wanted = [this](int index) { return wants(index); };
   const auto consume = [&](const SourceFrame& frame) {
-    const size_t num_given = given_.size();
     track_frame(frame);
-    if (source_.wants_found() && given_.size() > num_given) tell_source();
     if (after_frame) after_frame(frame);
     picture_.release();
     colour_.release();
@@ -242,12 +240,14 @@ void Flight::track_frame(SourceFrame frame) {
     frames_.push_back(record);
     return;
   }
-  eyes_.add(frame.luma);
-  combed_rows_.add(frame.luma);
   // Over a longer pause the motion is not predicted.
   if (!given_.empty() && frames_.back().withheld)
     gap_ = gap_ || frame.time_s - frames_[given_.back()].time_s > kLongestPause_s;
   give(frame, record);
+  // What a vehicle waits for comes before what only the report needs.
+  if (source_.wants_found()) tell_source();
+  eyes_.add(frame.luma);
+  combed_rows_.add(frame.luma);
   picture_ = frame.luma;
   colour_ = frame.colour;
   if (record.is_keyframe && options_.keeps_pictures)

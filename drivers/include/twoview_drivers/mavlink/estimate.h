@@ -65,7 +65,11 @@ typedef enum tvm_silence {
   TVM_SILENCE_ATTITUDE = 6,
   /* The first frame of a segment, after a pause or a jump: nothing says yet how fast the vehicle
      is. */
-  TVM_SILENCE_VELOCITY = 7
+  TVM_SILENCE_VELOCITY = 7,
+  /* The way that the pictures show contradicts the vehicle's own velocities, as in a picture of
+     another place or of something that moves; for at most 2 s. Or the segment is new, or was found
+     again, and has not been compared with them for 0.2 s yet. */
+  TVM_SILENCE_MOTION = 8
 } tvm_silence;
 
 /* Filled by tvm_estimator_options_init. */
@@ -123,12 +127,16 @@ typedef struct tvm_track {
   /* The next three are filled by tvm_session_send_track; a caller of tvm_estimator_update fills
      them. The time that the estimate states, us of the vehicle's clock. */
   uint64_t time_us;
-  /* Whether the map's z axis points along gravity, 0 or 1. */
+  /* 1: the map's z axis points along gravity. 0: not known. -1: it does not; the segment then gives
+     nothing until it has been 1 for a second. */
   int32_t is_upright;
   /* A reserved field that is 0. */
   int32_t reserved;
   /* The heading of the map's x axis, radians east of north; read for TVM_WORLD_NED only. */
   double heading_rad;
+  /* The vehicle's own velocity at the exposure, along the body's axes, m/s, and the standard
+     deviation of each component. A sigma of 0: not known, and nothing is compared with it. */
+  double velocity_m_s[3], velocity_sigma_m_s;
 } tvm_track;
 
 /* What is sent to an autopilot: the body (forward, right, down) in the local world. */
@@ -174,7 +182,14 @@ typedef struct tvm_estimator {
   /* The run of the vehicle's clock, the newest segment, and the first one that began in this run.
    */
   uint32_t run_id;
-  int32_t max_segment, first_segment, reserved;
+  int32_t max_segment, first_segment;
+  /* For how long the map must agree with the vehicle's vertical before it is believed again. */
+  int32_t doubt_ms;
+  /* Of the comparison with the vehicle's velocities: whether the map is on trial; over how long,
+     the way by the pictures, by how much more that is than the vehicle's; for how long they differ.
+   */
+  int32_t is_on_trial, reserved;
+  double compared_s, compared_way[3], compared_gap[3], refused_s;
   int64_t told_ns;
 } tvm_estimator;
 
