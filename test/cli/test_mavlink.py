@@ -374,9 +374,10 @@ class Mavlink(unittest.TestCase):
                 mavsdk.ComponentType.GROUND_STATION))
             ground.add_any_connection(f"udpin://127.0.0.1:{port}")
             with world.Vehicle(mavlink, self.port, routed_to=port) as vehicle:
-                with subprocess.Popen([PROGRAM, "odometry", "--mavlink", self.address,
-                                       "--camera-source", self.film, "--camera", self.camera, "-o",
-                                       self.folder / "mavsdk", "--send-odometry", "--quiet"]) as process:
+                command = [PROGRAM, "odometry", "--mavlink", self.address, "--camera-source",
+                           self.film, "--camera", self.camera, "-o", self.folder / "mavsdk",
+                           "--send-odometry", "--quiet"]
+                with subprocess.Popen(command) as process:
                     system = ground.first_autopilot(10)
                     telemetry, direct = Telemetry(system), MavlinkDirect(system)
                     telemetry.subscribe_odometry(lambda message, _: read.append(message))
@@ -393,7 +394,8 @@ class Mavlink(unittest.TestCase):
                 place, q = by_plugin.position_body, by_plugin.q
                 self.assertEqual((m.x, m.y, m.z, *m.q),
                                  (place.x_m, place.y_m, place.z_m, q.w, q.x, q.y, q.z))
-                self.assertEqual(list(m.pose_covariance), by_plugin.pose_covariance.covariance_matrix)
+                self.assertEqual(list(m.pose_covariance),
+                                 by_plugin.pose_covariance.covariance_matrix)
                 fields = json.loads(by_name.fields_json)
                 self.assertEqual((7, 197), (by_name.system_id, by_name.component_id))
                 for name in ("frame_id", "child_frame_id", "quality", "reset_counter", "vx",
