@@ -205,7 +205,8 @@ static tvm_silence silence_of(const tvm_estimator *e, const tvm_track *track) {
 /* A map that was turned once, such as one of another place, may be upright by chance in the next
    frame. */
 static void count_doubt(tvm_estimator *e, const tvm_track *track) {
-  const double step_ms = (double)(track->host_ns - e->last_ns) * 1e-6;
+  /* In floating point, since last_ns is the least number before the first frame. */
+  const double step_ms = 1e-6 * ((double)track->host_ns - (double)e->last_ns);
   if (track->state->has_pose && track->state->segment != e->last_segment) e->doubt_ms = 0;
   if (track->is_upright < 0) {
     e->doubt_ms = (int32_t)(1e3 * DOUBT_S);
