@@ -40,6 +40,15 @@ void tearDown(void) {}
 
 static void begin(void) { TEST_ASSERT_EQUAL_INT(TVS_OK, tvm_estimator_init(&estimator, &options)); }
 
+/* The map drifts so; filter_memory_s is how long the filter averages, 0: nothing is counted twice.
+ */
+static void begin_drifting(double share, double turn_rad, double memory_s) {
+  options.drift_share = share;
+  options.drift_turn_rad = turn_rad;
+  options.filter_memory_s = memory_s;
+  begin();
+}
+
 static int update(void) {
   TEST_ASSERT_EQUAL_INT(TVS_OK, tvm_estimator_update(&estimator, &track, &estimate));
   return estimate.silence;
@@ -253,9 +262,7 @@ static void test_a_metre_that_errs_grows_with_the_distance(void) {
 
 /* 4 m there and back: what drifts is by the way, not by the distance. A new segment begins anew. */
 static void test_the_map_drifts_with_the_way(void) {
-  options.drift_share = 0.005;
-  options.drift_turn_rad = 0.008;
-  begin();
+  begin_drifting(0.005, 0.008, 0);
   set_covariance(0.001, 0.02);
   update();
   set_place(2, 0, 0);
@@ -278,10 +285,7 @@ static void test_the_map_drifts_with_the_way(void) {
    as if it were new. What is new each time stays as it is, and so does the quality. */
 static void test_what_stays_is_sent_as_often_as_the_filter_counts_it(void) {
   double turn;
-  options.drift_share = 0.005;
-  options.drift_turn_rad = 0.008;
-  options.filter_memory_s = 1;
-  begin();
+  begin_drifting(0.005, 0.008, 1);
   set_covariance(0.001, 0.02);
   state.scale_sigma = 0.01;
   update();
@@ -301,10 +305,7 @@ static void test_what_stays_is_sent_as_often_as_the_filter_counts_it(void) {
    averages positions of 0.05 m for (0.05 / 0.02)^2 s. The attitude's variance is not of that time.
  */
 static void test_a_filter_averages_for_longer_what_it_knows_less(void) {
-  options.drift_share = 0.005;
-  options.drift_turn_rad = 0.0001;
-  options.filter_memory_s = 1;
-  begin();
+  begin_drifting(0.005, 0.0001, 1);
   set_covariance(0, 0);
   state.has_covariance = 1;
   update();

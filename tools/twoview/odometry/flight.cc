@@ -68,6 +68,14 @@ Pose pose_of(const double R[9], const double t[3]) {
   return pose;
 }
 
+// Whether a picture is as even as one of a covered or dazzled camera, but for noise.
+bool shows_nothing(const cv::Mat& luma) {
+  constexpr double kMostNoise = 5;  // grey values, standard deviation
+  cv::Scalar mean, sigma;
+  cv::meanStdDev(luma, mean, sigma);
+  return sigma[0] < kMostNoise;
+}
+
 }  // namespace
 
 int count_segments(const std::vector<FlightKeyframe>& keyframes) {
@@ -190,14 +198,6 @@ void Flight::tell_source() {
   }
   source_.found(state_, previous);
   told_ = state_;
-}
-
-// Whether a picture is as even as one of a covered or dazzled camera, but for noise.
-bool shows_nothing(const cv::Mat& luma) {
-  constexpr double kMostNoise = 5;  // grey values, standard deviation
-  cv::Scalar mean, sigma;
-  cv::meanStdDev(luma, mean, sigma);
-  return sigma[0] < kMostNoise;
 }
 
 // The tracker takes the turn since the frame that it was given before.

@@ -13,12 +13,12 @@ namespace cli {
 namespace {
 
 constexpr size_t kMaxFileBytes = 1 << 28;
-constexpr double kGapS = 0.25;   // longest time between two samples that are interpolated
-constexpr double kSameS = 1e-6;  // a sample at the time of the frame, as times are written
-constexpr size_t kNumbers = 12;  // a sample
+constexpr double kGapS = 0.25;      // longest time between two samples that are interpolated
+constexpr double kSameS = 1e-6;     // a sample at the time of the frame, as times are written
+constexpr size_t kNumbers = 12;     // a sample
+constexpr double kGyroGapS = 0.1;   // longest time between two samples of a gyro
+constexpr int kMostRateRadS = 100;  // above it, a gyro's rates are in degrees
 // What no drone has, as in the drivers: such a number is no measurement.
-constexpr int kMostRateRadS = 100;
-constexpr double kGyroGapS = 0.1;  // longest time between two samples of a gyro
 constexpr double kMostHeightM = 3000, kMostSpeedMS = 150;
 
 // The numbers of words[first..], in which "nan" means "not measured".

@@ -11,7 +11,8 @@ For each run: frames after the first estimate; of these those with an estimate w
 second ("fed"); of these those whose position is off by more than three of the filter's own standard
 deviations along some axis ("astray"); the largest error in standard deviations, and in metres; the
 longest silence; and the seconds from the end of the fault to the next frame that has an estimate
-and whose position is within three standard deviations ("back").
+and whose position is within three standard deviations ("back"). The places of a later segment, to
+which the filter is reset, are measured from where its first message puts it.
 
 Of the estimates themselves, for each flight without a fault: the mean squared error of position and
 of attitude a degree of freedom, in units of the covariance that is sent and of that of one message
